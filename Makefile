@@ -1,0 +1,76 @@
+# make help lists the targets. Everything happens in $(VENV), which is made and kept up to date.
+
+VENV ?= .venv
+PYTHON ?=
+PYTEST_ARGS ?=
+
+BIN := $(VENV)/bin
+# One stamp per set of packages: installing again only after these two files changed.
+CORE := $(VENV)/.installed-core
+DEV := $(VENV)/.installed-dev
+PINS := pyproject.toml constraints.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint clean
+
+help:
+	@echo 'make demo    install, then compare the hose models in short form (report in out/demo)'
+	@echo 'make test    install with the dev extra, then ruff, mypy and pytest'
+	@echo '             PYTEST_ARGS="-m \"not slow\"" leaves out the slow tests'
+	@echo 'make lint    only ruff and mypy'
+	@echo 'make clean   remove $(VENV), build products, caches and out/demo (runs are kept)'
+	@echo ''
+	@echo 'PYTHON=/path/to/python picks the interpreter (3.11 or 3.12) of a new $(VENV);'
+	@echo 'VENV=folder puts it elsewhere. uv installs if it is on the PATH, pip otherwise.'
+
+demo: $(CORE)
+	$(BIN)/hose-mj compare --quick --out out/demo
+
+test: lint
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: $(DEV)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) build dist out/demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find hose_mj learning tools tests -type d -name __pycache__ -prune -exec rm -rf {} +
+
+# A candidate counts only if it runs and is of a version we support: a name on the PATH may be a
+# launcher without an interpreter behind it. A virtual environment that fails half way is removed.
+$(BIN)/python:
+	@check='import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))'; \
+	for candidate in $(or $(PYTHON),python3.12 python3.11 python3 python); do \
+	  if "$$candidate" -c "$$check" >/dev/null 2>&1; then found=$$candidate; break; fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	  echo 'error: no Python 3.11 or 3.12 among: $(or $(PYTHON),python3.12 python3.11 python3 python)' >&2; \
+	  echo 'Install one of them, or name yours: make PYTHON=/path/to/python3.12' >&2; \
+	  exit 1; \
+	fi; \
+	echo "Making $(VENV) with $$("$$found" --version)"; \
+	"$$found" -m venv $(VENV) || { \
+	  rm -rf $(VENV); \
+	  echo 'error: could not make $(VENV); on Debian and Ubuntu install the package python3-venv' >&2; \
+	  exit 1; \
+	}
+
+$(CORE): $(PINS) | $(BIN)/python
+	$(call install,.)
+	@touch $@
+
+$(DEV): $(PINS) | $(BIN)/python
+	$(call install,.[dev])
+	@touch $(CORE) $@
+
+define install
+@echo 'Installing $(1) into $(VENV) (a minute or two the first time)'
+@if command -v uv >/dev/null 2>&1; then \
+  uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '$(1)'; \
+else \
+  $(BIN)/python -m pip install --quiet --disable-pip-version-check \
+    --constraint constraints.txt --editable '$(1)'; \
+fi
+endef

@@ -1,0 +1,25 @@
+"""Errors a user can act on: each names the thing, the value received and the valid set."""
+
+from __future__ import annotations
+
+
+class HoseError(Exception):
+    """Base of every error that hose_mj raises on purpose."""
+
+
+class InputError(HoseError, ValueError):
+    """A value outside its valid set.
+
+    Args:
+        thing: what was given, in the user's words (``"bending_stiffness"``).
+        value: the value received.
+        valid: the valid set, in words (``"a finite number above 0 (N m^2)"``).
+    """
+
+    def __init__(self, thing: str, value: object, valid: str) -> None:
+        self.thing, self.value, self.valid = thing, value, valid
+        super().__init__(f"{thing} is {value!r}; valid: {valid}")
+
+
+class StepError(HoseError, RuntimeError):
+    """A time step or a static solve that no fallback could finish; the state before it is kept."""

@@ -1,0 +1,126 @@
+"""Clamps, attachments and loads of a chain inside an mjModel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from hose_mj.hoses.model import Array, Hold, Reaction
+
+
+@dataclass(frozen=True)
+class Held:
+    """A hold and where it is to be.
+
+    Attributes:
+        hold: the user's handle.
+        position: target of the point (3,), m.
+        frame: target of the segment's frame (4,); an attachment ignores it.
+        rigid: the first segment is part of the world, else an equality constraint holds it.
+    """
+
+    hold: Hold
+    position: Array
+    frame: Array
+    rigid: bool = False
+
+    def to_numbers(self) -> Array:
+        """All of it as one array (11,)."""
+        flags = [self.hold.number, self.hold.arc_length, self.hold.fixes_tangent, self.rigid]
+        return np.concatenate([flags, self.position, self.frame])
+
+    @classmethod
+    def from_numbers(cls, row: Array) -> Held:
+        """The inverse of `to_numbers`."""
+        hold = Hold(int(row[0]), float(row[1]), bool(row[2]))
+        return cls(hold, row[4:7].copy(), row[7:11].copy(), bool(row[3]))
+
+    def moved(self, position: Array, frame: Array) -> Held:
+        """The same hold with another target."""
+        return replace(self, position=position, frame=frame)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A point force (3,) N and moment (3,) N m in the world frame at an arc length."""
+
+    arc_length: float
+    force: Array
+    moment: Array
+
+    def to_numbers(self) -> Array:
+        """All of it as one array (7,)."""
+        return np.concatenate([[self.arc_length], self.force, self.moment])
+
+    @classmethod
+    def from_numbers(cls, row: Array) -> Load:
+        """The inverse of `to_numbers`."""
+        return cls(float(row[0]), row[1:4].copy(), row[4:7].copy())
+
+
+def stack_rows(items: list[Held] | list[Load], width: int) -> Array:
+    """Returns holds or loads as an array (k, width), for a snapshot."""
+    return np.array([item.to_numbers() for item in items]).reshape(-1, width)
+
+
+def add_equality(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, along: float, held: Held, settings: dict[str, object]
+) -> None:
+    """Ties a point of a segment to a mocap body: a weld for a clamp, else a connect.
+
+    A weld also holds the twist of the segment, which the tangent alone would leave free.
+
+    Args:
+        spec: model that is being made.
+        body: the segment.
+        along: distance of the point from the segment's first node (m).
+        held: what holds it.
+        settings: solref and solimp of the constraint.
+    """
+    number = held.hold.number
+    body.add_site(name=f"held{number}", pos=[along, 0, 0])
+    target = spec.worldbody.add_body(
+        name=f"target{number}", mocap=True, pos=held.position, quat=held.frame
+    )
+    target.add_site(name=f"target{number}")
+    kind = mujoco.mjtEq.mjEQ_WELD if held.hold.fixes_tangent else mujoco.mjtEq.mjEQ_CONNECT
+    spec.add_equality(
+        name=f"hold{number}",
+        type=kind,
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+        name1=f"held{number}",
+        name2=f"target{number}",
+        **settings,
+    )
+
+
+def compute_equality_reaction(
+    model: mujoco.MjModel, data: mujoco.MjData, held: Held, body: int
+) -> Reaction:
+    """Returns what an equality constraint does to the hose at the held point.
+
+    The force is the constraint's first three rows. The rows of a weld's rotation are in a frame of
+    MuJoCo's own, so the moment is the one that gives the constraint's generalised force.
+    """
+    number = model.equality(f"hold{held.hold.number}").id
+    mine = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == number)
+    force = data.efc_force[mine][:3].copy()
+    if not held.hold.fixes_tangent:
+        return Reaction(force, np.zeros(3))
+    generalized = np.zeros(model.nv)
+    mujoco.mj_mulJacTVec(model, data, generalized, np.where(mine, data.efc_force, 0.0))
+    linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    point = data.site(f"held{held.hold.number}").xpos
+    mujoco.mj_jac(model, data, linear, angular, point, body)
+    moment = np.linalg.lstsq(angular.T, generalized - linear.T @ force, rcond=1e-9)[0]
+    return Reaction(force, moment)
+
+
+def compute_root_reaction(data: mujoco.MjData, held: Held, body: int) -> Reaction:
+    """Returns what the world does to the first segment that is part of it."""
+    wrench = data.cfrc_int[body]
+    force = wrench[3:].copy()
+    arm = data.subtree_com[body] - held.position
+    return Reaction(force, wrench[:3] + np.cross(arm, force))

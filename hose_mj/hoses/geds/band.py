@@ -1,0 +1,59 @@
+"""Cholesky factorization and triangular solves of a symmetric band, in O(n).
+
+A lower band is stored by columns: `band[j, k]` is entry (j + k, j), k = 0 .. 4 d - 1 for d unknowns
+per control point. Rows are 8 d wide and 4 d rows follow the last, all zero, so that every inner
+loop has the fixed length 4 d. In a factor, column 0 holds the inverse diagonal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.hoses.model import Array
+
+
+def make_band(n_control_points: int, dimension: int) -> Array:
+    """Returns an empty band for n control points with `dimension` unknowns each."""
+    return np.zeros((n_control_points * dimension + 4 * dimension, 8 * dimension))
+
+
+@compiled
+def factorize(axes, size, band):  # type: ignore[no-untyped-def]
+    """Replaces the first `size` columns by their Cholesky factor; False at a pivot that is not positive."""
+    width = 4 * len(axes)
+    for j in range(size):
+        pivot = band[j, 0]
+        if not pivot > 0.0:
+            return False
+        inverse = 1.0 / np.sqrt(pivot)
+        for k in range(width):
+            band[j, k] *= inverse
+        for k in range(1, width):
+            factor = band[j, k]
+            for m in range(width):
+                band[j + k, m] -= factor * band[j, k + m]
+        band[j, 0] = inverse
+    return True
+
+
+@compiled
+def solve_lower(axes, start, size, band, rhs):  # type: ignore[no-untyped-def]
+    """Solves L y = rhs in place; rhs (size + 4 d) vanishes before `start` and after `size`."""
+    width = 4 * len(axes)
+    for j in range(start, size):
+        value = rhs[j] * band[j, 0]
+        rhs[j] = value
+        for k in range(1, width):
+            rhs[j + k] -= value * band[j, k]
+
+
+@compiled
+def solve_upper(axes, size, band, rhs):  # type: ignore[no-untyped-def]
+    """Solves L^T x = rhs in place; rhs (size + 4 d) vanishes after `size`."""
+    width = 4 * len(axes)
+    for j in range(size - 1, -1, -1):
+        value = rhs[j]
+        for k in range(1, width):
+            value -= band[j, k] * rhs[j + k]
+        rhs[j] = value * band[j, 0]

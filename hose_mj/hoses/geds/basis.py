@@ -1,0 +1,148 @@
+"""The cubic B-spline of the hose: knots, basis functions, quadrature tables, mass (thesis A.1-A.3, A.12-A.19).
+
+Everything that does not change while a hose moves is computed here, once. Arc length s runs over
+the rest length, [0, L]; n control points make n - 3 spans, and four control points, from number
+`span` on, shape each span.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.hoses.model import Array
+
+DEGREE = 3
+
+
+class Tables(NamedTuple):
+    """Quadrature tables of the strain energy: three Gauss points on each of S spans.
+
+    Attributes:
+        first: basis derivatives dN/ds at the Gauss points, (S, 3, 4).
+        second: d2N/ds2, (S, 3, 4).
+        products: the outer products of derivatives that a tangent stiffness is made of, (S, 12, 16):
+            first x first at each Gauss point, first x second, second x first, second x second.
+        weights: Gauss weights that sum to 1, (3,).
+        linear: sqrt(3) xi at the Gauss points, xi in [-1, 1]: the linear strain mode, (3,).
+        span_length: L / S (m).
+    """
+
+    first: Array
+    second: Array
+    products: Array
+    weights: Array
+    linear: Array
+    span_length: float
+
+
+def make_knots(n_control_points: int, length: float) -> Array:
+    """Returns the open-uniform knots over [0, length], shape (n + 4,)."""
+    inner = np.linspace(0.0, length, n_control_points - DEGREE + 1)
+    return np.concatenate([[0.0] * DEGREE, inner, [length] * DEGREE])
+
+
+def make_greville(knots: Array) -> Array:
+    """Returns the arc lengths at which control points rest on a straight hose, shape (n,)."""
+    return (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+
+
+@compiled
+def evaluate_basis(knots, arc_lengths, spans, values):  # type: ignore[no-untyped-def]
+    """Cox-de Boor recursion (thesis A.2) with two derivatives.
+
+    Writes the span (k,) of each arc length and `values` (k, 3, 4): N, dN/ds and d2N/ds2 of the four
+    basis functions that do not vanish there.
+    """
+    last_span = len(knots) - 2 * DEGREE - 2
+    step = knots[DEGREE + 1] - knots[DEGREE]
+    lower = np.zeros((4, 4))
+    for k in range(len(arc_lengths)):
+        s = arc_lengths[k]
+        span = min(max(int(s / step), 0), last_span)
+        spans[k] = span
+        lower[:, :] = 0.0
+        lower[0, 0] = 1.0
+        # lower[p, i]: N_(span + 3 - p + i, p)(s), one degree after the other.
+        for degree in range(1, DEGREE + 1):
+            for i in range(degree + 1):
+                at = span + DEGREE - degree + i
+                value = 0.0
+                if i > 0:
+                    value += (s - knots[at]) / (knots[at + degree] - knots[at]) * lower[degree - 1, i - 1]
+                if i < degree:
+                    gap = knots[at + degree + 1] - knots[at + 1]
+                    value += (knots[at + degree + 1] - s) / gap * lower[degree - 1, i]
+                lower[degree, i] = value
+        for i in range(4):
+            values[k, 0, i] = lower[3, i]
+            values[k, 1, i] = _difference(knots, span, 3, i, lower[2, i - 1], lower[2, i])
+            before = _difference(knots, span, 2, i - 1, lower[1, i - 2], lower[1, i - 1])
+            after = _difference(knots, span, 2, i, lower[1, i - 1], lower[1, i])
+            values[k, 2, i] = _difference(knots, span, 3, i, before, after)
+
+
+@compiled
+def _difference(knots, span, degree, i, before, after):  # type: ignore[no-untyped-def]
+    """Derivative of N_(span + 3 - degree + i, degree) from its two neighbours of lower degree."""
+    at = span + DEGREE - degree + i
+    value = 0.0
+    if 0 < i <= degree:
+        value += degree / (knots[at + degree] - knots[at]) * before
+    if 0 <= i < degree:
+        value -= degree / (knots[at + degree + 1] - knots[at + 1]) * after
+    return value
+
+
+def compute_basis(knots: Array, arc_lengths: Array) -> tuple[np.ndarray, Array]:
+    """Returns the spans (k,) and the basis values and derivatives (k, 3, 4) at arc lengths (k,)."""
+    spans = np.empty(len(arc_lengths), dtype=np.int64)
+    values = np.empty((len(arc_lengths), 3, 4))
+    evaluate_basis(knots, arc_lengths, spans, values)
+    return spans, values
+
+
+def make_tables(knots: Array) -> Tables:
+    """Returns the quadrature tables of the strain energy."""
+    n_spans = len(knots) - 2 * DEGREE - 1
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    span_length = float(knots[-1]) / n_spans
+    at = (np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span_length
+    _, values = compute_basis(knots, at.ravel())
+    first = np.ascontiguousarray(values[:, 1].reshape(n_spans, 3, 4))
+    second = np.ascontiguousarray(values[:, 2].reshape(n_spans, 3, 4))
+    products = np.empty((n_spans, 12, 16))
+    for row, (left, right) in enumerate(
+        [(first, first), (first, second), (second, first), (second, second)]
+    ):
+        outer = np.einsum("sgi,sgj->sgij", left, right)
+        products[:, 3 * row : 3 * row + 3] = outer.reshape(n_spans, 3, 16)
+    return Tables(first, second, products, weights / 2.0, np.sqrt(3.0) * nodes, span_length)
+
+
+def make_mass(knots: Array, linear_density: float) -> Array:
+    """Returns the constant mass matrix of thesis A.18 per coordinate, as a lower band (n, 4).
+
+    Entry (j, k) couples control points j + k and j; four Gauss points integrate it exactly.
+    """
+    n_spans = len(knots) - 2 * DEGREE - 1
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    span_length = float(knots[-1]) / n_spans
+    at = (np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span_length
+    spans, values = compute_basis(knots, at.ravel())
+    scale = linear_density * 0.5 * span_length * np.tile(weights, n_spans)
+    mass = np.zeros((n_spans + DEGREE, 4))
+    for span, basis, weight in zip(spans, values[:, 0], scale, strict=True):
+        for j in range(4):
+            for i in range(j, 4):
+                mass[span + j, i - j] += weight * basis[i] * basis[j]
+    return mass
+
+
+def interpolate(knots: Array, arc_lengths: Array, points: Array) -> Array:
+    """Returns control points (n, d) of the spline through n points at n arc lengths (thesis A.3)."""
+    design = BSpline.design_matrix(arc_lengths, knots, DEGREE).toarray()
+    return np.asarray(np.linalg.solve(design, points))

@@ -1,0 +1,32 @@
+"""How kernels are compiled: once per machine, kept on disk, with arithmetic that still sees a NaN.
+
+`nnan` and `ninf` are left out of the fast-math flags on purpose: with them a banded Cholesky
+factorization accepts a pivot that is not a number.
+
+A kernel that serves hoses in a plane and in space takes `axes`, a tuple of two or three zeros: its
+length is part of its type, so one source compiles into one specialised version for each.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numba
+
+compiled = numba.njit(cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"}, error_model="numpy")
+
+
+@contextmanager
+def compile_notice(what: str) -> Iterator[None]:
+    """Says on stderr that kernels are being compiled when the block takes over a second."""
+    notice = f"hose_mj: compiling the {what} (once on this machine, under 30 s) ..."
+    timer = threading.Timer(1.0, lambda: print(notice, file=sys.stderr, flush=True))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

@@ -1,0 +1,259 @@
+"""The protocol that every hose model follows, whether it owns its state or lives in an mjModel.
+
+Arc lengths are rest arc lengths in [0, L] (m); positions, forces and moments are in the world
+frame (m, N, N m). Every query takes a float or an array of arc lengths of shape (k,) and always
+answers with a leading axis k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.spec import HoseSpec
+
+Array = NDArray[np.float64]
+Curve = ArrayLike | Callable[[Array], ArrayLike]
+"""Points along the hose from s = 0 to s = L, shape (k, 3), spaced as they like; or a function of
+arc lengths (k,) that returns positions (k, 3)."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A handle on one clamp or attachment.
+
+    Attributes:
+        number: counts up from 0 over the life of a hose; never used twice.
+        arc_length: where along the hose (m).
+        fixes_tangent: True for a clamp, False for an attachment.
+    """
+
+    number: int
+    arc_length: float
+    fixes_tangent: bool
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """What a hold does to the hose at the end of the last step: force (3,) N, moment (3,) N m."""
+
+    force: Array
+    moment: Array
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies of the whole hose (J); `gravitational` is zero at the world's origin."""
+
+    kinetic: float
+    stretching: float
+    bending: float
+    twisting: float
+    gravitational: float
+
+    @property
+    def total(self) -> float:
+        """Sum of all five (J)."""
+        return self.kinetic + self.stretching + self.bending + self.twisting + self.gravitational
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """Linear (3,) kg m/s and angular (3,) kg m^2/s momentum about the world's origin."""
+
+    linear: Array
+    angular: Array
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """Small motions about the present state, in the model's own coordinates z (m of them).
+
+    mass z'' + stiffness z = 0 on the null space of `constraints`, loads and gravity included in
+    the stiffness. Shapes (m, m), (m, m), (c, m).
+    """
+
+    mass: Array
+    stiffness: Array
+    constraints: Array
+
+
+@runtime_checkable
+class HoseModel(Protocol):
+    """One hose, its clock and what holds it."""
+
+    spec: HoseSpec
+
+    @property
+    def timestep(self) -> float:
+        """Length of one step (s)."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the last reset (s)."""
+        ...
+
+    def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
+        """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads.
+
+        Raises:
+            InputError: a curve that is not finite, repeats a point or is far from the hose's length.
+        """
+        ...
+
+    def clamp(
+        self,
+        arc_length: float,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+    ) -> Hold:
+        """Holds a point and the direction of the tangent there; by default where they are now."""
+        ...
+
+    def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
+        """Holds a point and leaves the tangent free; by default where it is now."""
+        ...
+
+    def move(
+        self, hold: Hold, position: ArrayLike | None = None, tangent: ArrayLike | None = None
+    ) -> None:
+        """Sets where a hold is to be at the end of the next step."""
+        ...
+
+    def release(self, hold: Hold) -> None:
+        """Lets go."""
+        ...
+
+    def reaction(self, hold: Hold) -> Reaction:
+        """Force and moment of a hold on the hose at the end of the last step."""
+        ...
+
+    def apply_force(self, arc_length: float, force: ArrayLike) -> None:
+        """Adds a point force (3,) N that acts until `clear_loads`."""
+        ...
+
+    def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
+        """Adds a point moment (3,) N m that acts until `clear_loads`; its part along the tangent twists."""
+        ...
+
+    def clear_loads(self) -> None:
+        """Drops all point forces and moments; gravity stays."""
+        ...
+
+    def step(self, n_steps: int = 1) -> None:
+        """Advances the clock by n_steps time steps.
+
+        Raises:
+            StepError: a step that cannot be finished; the state before it is kept.
+        """
+        ...
+
+    def solve_static(self) -> None:
+        """Moves the hose to static equilibrium under its holds and loads, velocity zero.
+
+        Raises:
+            StepError: no equilibrium was found; the state before is kept.
+        """
+        ...
+
+    def linearize(self) -> Linearization:
+        """Mass, tangent stiffness and constraints at the present state."""
+        ...
+
+    def position(self, arc_length: ArrayLike) -> Array:
+        """Centre line, shape (k, 3), m."""
+        ...
+
+    def velocity(self, arc_length: ArrayLike) -> Array:
+        """Velocity of the centre line, shape (k, 3), m/s."""
+        ...
+
+    def tangent(self, arc_length: ArrayLike) -> Array:
+        """Unit tangent, shape (k, 3)."""
+        ...
+
+    def tension(self, arc_length: ArrayLike) -> Array:
+        """Axial force, positive in tension, shape (k,), N."""
+        ...
+
+    def curvature(self, arc_length: ArrayLike) -> Array:
+        """Material curvature (rotation of the tangent per rest length), shape (k,), 1/m."""
+        ...
+
+    def energies(self) -> Energies:
+        """Energies at the present state."""
+        ...
+
+    def momentum(self) -> Momentum:
+        """Linear and angular momentum at the present state."""
+        ...
+
+    def snapshot(self) -> dict[str, Any]:
+        """All that a later `restore` needs to continue bit by bit: arrays and plain numbers only."""
+        ...
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot of this hose."""
+        ...
+
+
+def check_arc_lengths(arc_length: ArrayLike, length: float, what: str = "arc_length") -> Array:
+    """Returns arc lengths as a float array (k,); raises `InputError` for one off the hose."""
+    values = np.atleast_1d(np.asarray(arc_length, dtype=np.float64))
+    if values.ndim != 1 or not np.all((values >= 0.0) & (values <= length)):
+        raise InputError(what, arc_length, f"numbers on the hose, 0 to {length} m")
+    return values
+
+
+def check_vector(name: str, value: ArrayLike) -> Array:
+    """Returns a finite vector of shape (3,); raises `InputError` otherwise."""
+    try:
+        vector = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(name, value, "three finite numbers") from None
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        raise InputError(name, value, "three finite numbers")
+    return vector
+
+
+def sample_curve(curve: Curve, length: float, arc_lengths: Array) -> Array:
+    """Returns the positions (k, 3) of a curve at rest arc lengths (k,).
+
+    A polyline is sampled evenly by its own length (thesis A.3): its strain is the same everywhere.
+
+    Raises:
+        InputError: not finite, fewer than two points, a point repeated, or a length outside 0.5 to
+            2 times the hose's.
+    """
+    if callable(curve):
+        points = np.asarray(curve(arc_lengths), dtype=np.float64)
+        if points.shape != (len(arc_lengths), 3):
+            raise InputError("curve(arc_lengths)", points.shape, f"shape ({len(arc_lengths)}, 3)")
+        check_curve_points(points)
+        return points
+    points = np.asarray(curve, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
+        raise InputError("curve", points.shape, "an array of shape (k, 3) with k >= 2")
+    check_curve_points(points)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    if not 0.5 * length <= along[-1] <= 2.0 * length:
+        raise InputError("length of the curve (m)", along[-1], f"0.5 to 2 times the hose's, {length}")
+    fraction = arc_lengths / length * along[-1]
+    return np.stack([np.interp(fraction, along, points[:, c]) for c in range(3)], axis=1)
+
+
+def check_curve_points(points: Array) -> None:
+    """Raises `InputError` for points that are not finite or repeat their neighbour."""
+    if not np.all(np.isfinite(points)):
+        bad = int(np.argmin(np.all(np.isfinite(points), axis=1)))
+        raise InputError(f"curve[{bad}]", points[bad].tolist(), "finite coordinates (m)")
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if np.any(steps == 0.0):
+        bad = int(np.argmin(steps)) + 1
+        raise InputError(f"curve[{bad}]", points[bad].tolist(), "a point apart from the one before it")

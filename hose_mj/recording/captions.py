@@ -1,0 +1,25 @@
+"""Texts beside the pictures of a recording, in Markdown."""
+
+from __future__ import annotations
+
+from hose_mj.recording.episode import Scene
+
+
+def format_settings(settings: dict[str, str]) -> str:
+    """Returns the settings as a Markdown table."""
+    rows = [f"| {_cell(name)} | {_cell(value)} |" for name, value in settings.items()]
+    return "\n".join(["# Settings", "", "| setting | value |", "|---|---|", *rows])
+
+
+def format_legend(scene: Scene) -> str:
+    """Returns one Markdown line per track: name, number of points and samples, radius."""
+    lines = [
+        f"| {_cell(t.name)} | {len(t.arc_lengths)} | {len(t.times)} | {1e3 * t.radius:.3g} |"
+        for t in scene.tracks
+    ]
+    head = ["| hose | points drawn | samples | radius (mm) |", "|---|---|---|---|"]
+    return "\n".join([*head, *lines])
+
+
+def _cell(text: object) -> str:
+    return " ".join(str(text).split()).replace("|", "\\|")

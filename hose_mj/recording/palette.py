@@ -1,0 +1,47 @@
+"""One colour per hose model, the same in plots, reports and the viewer.
+
+The colours are Okabe and Ito's, told apart by readers with any common colour blindness, and have
+enough contrast on white paper as well as on the viewer's dark ground.
+"""
+
+from __future__ import annotations
+
+Rgb = tuple[int, int, int]
+"""Red, green, blue, each 0 to 255."""
+
+COLORS: dict[str, Rgb] = {
+    "geds": (0, 114, 178),
+    "cable": (213, 94, 0),
+    "flex": (0, 158, 115),
+    "hinge-chain": (204, 121, 167),
+    "reference": (127, 127, 127),
+}
+MARKERS: dict[str, str] = {
+    "geds": "o",
+    "cable": "s",
+    "flex": "^",
+    "hinge-chain": "D",
+    "reference": "x",
+}
+LIMIT: Rgb = (160, 40, 40)
+OTHERS: tuple[Rgb, ...] = ((86, 180, 233), (230, 159, 0), (120, 94, 200), (100, 100, 60))
+
+
+def find_model(label: str) -> str | None:
+    """Returns the model id that a label starts with ("cable, 40 segments" -> "cable"), or None."""
+    for model in sorted(COLORS, key=len, reverse=True):
+        rest = label.lower()[len(model) :]
+        if label.lower().startswith(model) and not rest[:1].isalnum():
+            return model
+    return None
+
+
+def find_color(label: str, position: int = 0) -> Rgb:
+    """Returns the colour of a label's model; without a model, the spare colour at `position`."""
+    model = find_model(label)
+    return COLORS[model] if model is not None else OTHERS[position % len(OTHERS)]
+
+
+def format_hex(color: Rgb) -> str:
+    """Returns "#rrggbb"."""
+    return "#{:02x}{:02x}{:02x}".format(*color)

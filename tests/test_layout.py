@@ -1,0 +1,226 @@
+"""The rules on imports: every arrow runs down, and importing the package costs next to nothing."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# What each part of hose_mj stands on; the longest prefix of a module's name decides its part.
+FLOORS = {
+    "hose_mj": {"hose_mj.errors", "hose_mj.hoses.registry", "hose_mj.hoses.spec"},
+    "hose_mj.errors": set(),
+    "hose_mj.recording": {"hose_mj.errors"},
+    "hose_mj.hoses.spec": {"hose_mj.errors"},
+    "hose_mj.hoses": {"hose_mj.errors", "hose_mj.hoses.spec"},
+    "hose_mj.scenes": {"hose_mj.errors", "hose_mj.hoses.spec"},
+    "hose_mj.validation": {"hose_mj.errors", "hose_mj.hoses"},
+    "hose_mj.world": {"hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes"},
+    "hose_mj.constraints": {
+        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
+    },
+    "hose_mj.tasks": {
+        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
+        "hose_mj.constraints",
+    },
+    "hose_mj.envs": {
+        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
+        *("hose_mj.constraints", "hose_mj.tasks"),
+    },
+}
+PUBLIC = {"hose_mj.envs", "hose_mj.tasks", "hose_mj.recording", "hose_mj.errors"}
+PACKAGES = ("hose_mj", "learning", "tools")
+HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy"}
+JIT = {"compiled", "jit", "njit", "vectorize", "guvectorize"}
+
+
+class Import(NamedTuple):
+    """`from module import name`, or `import module` with no name."""
+
+    module: str
+    name: str | None
+
+    @property
+    def target(self) -> str:
+        """The module imported: `from a import b` is a.b where that is a module."""
+        full = f"{self.module}.{self.name}"
+        return full if self.name and find_file(full) else self.module
+
+
+def find_file(module: str) -> Path | None:
+    base = ROOT.joinpath(*module.split("."))
+    for file in (base.with_suffix(".py"), base / "__init__.py"):
+        if file.is_file():
+            return file
+    return None
+
+
+def find_modules(*packages: str) -> dict[str, ast.Module]:
+    found = {}
+    for package in packages:
+        for file in sorted((ROOT / package).rglob("*.py")):
+            parts = file.relative_to(ROOT).with_suffix("").parts
+            name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+            found[name] = ast.parse(file.read_text(encoding="utf-8"), str(file))
+    return found
+
+
+def find_imports(module: str, tree: ast.Module) -> Iterator[Import]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (Import(alias.name, None) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            source = node.module or ""
+            if node.level:
+                is_package = find_file(module) == ROOT.joinpath(*module.split("."), "__init__.py")
+                parts = module.split(".")[: None if is_package else -1]
+                parts = parts[: len(parts) - (node.level - 1)]
+                source = ".".join([*parts, *filter(None, [source])])
+            yield from (Import(source, alias.name) for alias in node.names)
+
+
+def is_within(module: str, packages) -> bool:
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
+
+
+def find_floor(module: str) -> str:
+    """The part of hose_mj a module belongs to; the top level is a part of its own."""
+    inside = [part for part in FLOORS if part != "hose_mj" and is_within(module, [part])]
+    assert inside or module == "hose_mj", f"{module} is on no floor: add it to FLOORS"
+    return max(inside, key=len, default="hose_mj")
+
+
+def find_breach(module: str, imported: Import) -> str | None:
+    """What an import breaks, in words, or None."""
+    target = imported.target
+    if is_within(target, ["rerun", "rerun_bindings"]):
+        return (
+            None if module == "hose_mj.recording.rerun" else "only recording/rerun.py imports rerun"
+        )
+    if is_within(module, ["learning"]):
+        if is_within(target, ["tools"]):
+            return "learning never imports tools"
+        if is_within(target, ["hose_mj"]) and target != "hose_mj" and not is_within(target, PUBLIC):
+            return "learning sees only what hose_mj publishes"
+    if is_within(module, ["hose_mj"]):
+        if is_within(target, ["learning", "tools"]):
+            return "hose_mj never imports learning or tools"
+        floor = find_floor(module)
+        if is_within(target, ["hose_mj"]) and find_floor(target) != floor:
+            below = FLOORS[floor]
+            if find_floor(target) not in below and target not in below:
+                return f"{floor} stands on {sorted(below)} alone"
+    return None
+
+
+def is_kernel_file(module: str, tree: ast.Module) -> bool:
+    decorators = (
+        decorator.func if isinstance(decorator, ast.Call) else decorator
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        for decorator in node.decorator_list
+    )
+    names = (d.attr if isinstance(d, ast.Attribute) else getattr(d, "id", "") for d in decorators)
+    return module.endswith("_kernels") or any(name in JIT for name in names)
+
+
+def is_class_of_ours(imported: Import) -> bool:
+    """Whether a name is a class of ours; a NamedTuple of arrays is data that numba understands."""
+    file = find_file(imported.module)
+    if not is_within(imported.module, PACKAGES) or file is None:
+        return False
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ClassDef) and node.name == imported.name:
+            return not any(getattr(base, "id", "") == "NamedTuple" for base in node.bases)
+    return False
+
+
+MODULES = find_modules(*PACKAGES)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_arrows_run_down(module):
+    breaches = [
+        f"{imported}: {breach}"
+        for imported in find_imports(module, MODULES[module])
+        if (breach := find_breach(module, imported))
+    ]
+    assert not breaches
+
+
+@pytest.mark.parametrize("module", [m for m, tree in MODULES.items() if is_kernel_file(m, tree)])
+def test_kernels_import_no_class_of_ours(module):
+    assert not [i for i in find_imports(module, MODULES[module]) if is_class_of_ours(i)]
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("hose_mj.errors", "import tools.cli"),
+        ("hose_mj.envs.gym", "from learning import tables"),
+        ("hose_mj.hoses.geds", "from hose_mj.world import world"),
+        ("hose_mj.hoses.spec", "from hose_mj.hoses.model import HoseModel"),
+        ("hose_mj.hoses.cable", "from hose_mj import HoseSpec"),
+        ("hose_mj.hoses.cable", "from hose_mj.scenes.mjcf import read_scene"),
+        ("hose_mj.recording.episode", "from hose_mj.hoses import spec"),
+        ("hose_mj.errors", "from .hoses import spec"),
+        ("hose_mj.recording.episode", "import rerun as rr"),
+        ("tools.view", "from rerun.chunk import RrdReader"),
+        ("learning.loop", "import tools"),
+        ("learning.loop", "from hose_mj.hoses import spec"),
+        ("learning.loop", "from hose_mj.world.world import World"),
+    ],
+)
+def test_the_rules_catch(module, line):
+    assert any(find_breach(module, i) for i in find_imports(module, ast.parse(line)))
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("hose_mj.recording.rerun", "import rerun as rr"),
+        ("hose_mj.recording.rerun", "from hose_mj.recording.episode import Scene"),
+        ("hose_mj.world.world", "from hose_mj.hoses.model import HoseModel"),
+        ("hose_mj.envs.gym", "from hose_mj.tasks.line import Line"),
+        ("learning.loop", "from hose_mj import InputError"),
+        ("learning.loop", "from hose_mj.envs.turns import make"),
+        ("tools.view", "from hose_mj.recording import rerun"),
+    ],
+)
+def test_the_rules_allow(module, line):
+    assert not any(find_breach(module, i) for i in find_imports(module, ast.parse(line)))
+
+
+def test_the_kernel_rule_tells_kernels_and_classes():
+    assert is_kernel_file("a", ast.parse("@numba.njit(cache=True)\ndef f(): ..."))
+    assert is_kernel_file("a", ast.parse("@njit\ndef f(): ..."))
+    assert is_kernel_file("a.b_kernels", ast.parse(""))
+    assert not is_kernel_file("a", ast.parse("@property\ndef f(): ..."))
+    assert is_class_of_ours(Import("hose_mj.hoses.spec", "HoseSpec"))
+    assert not is_class_of_ours(Import("hose_mj.hoses.spec", "check_number"))
+    assert not is_class_of_ours(Import("numpy", "ndarray"))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_importing_a_package_loads_nothing_heavy(package):
+    code = f"import sys, {package}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert not HEAVY & set(done.stdout.split())
+
+
+def test_exports_are_loaded_at_first_use():
+    import hose_mj
+    from hose_mj.hoses.spec import HoseSpec
+
+    assert hose_mj.HoseSpec is HoseSpec
+    assert set(hose_mj.__all__) <= set(dir(hose_mj))
+    with pytest.raises(AttributeError, match="'no_such_name'"):
+        _ = hose_mj.no_such_name

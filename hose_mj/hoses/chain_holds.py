@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import mujoco
 import numpy as np
 
+from hose_mj.errors import InputError
+from hose_mj.hoses.chain_layout import (
+    ChainLayout,
+    conjugate,
+    exponential,
+    multiply,
+    rotation_vector,
+)
 from hose_mj.hoses.model import Array, Hold, Reaction
 
 
@@ -18,28 +28,50 @@ class Held:
         hold: the user's handle.
         position: target of the point (3,), m.
         frame: target of the segment's frame (4,); an attachment ignores it.
+        last_position: target of the step before.
+        last_frame: target of the step before.
         rigid: the first segment is part of the world, else an equality constraint holds it.
     """
 
     hold: Hold
     position: Array
     frame: Array
+    last_position: Array
+    last_frame: Array
     rigid: bool = False
 
+    WIDTH: ClassVar[int] = 18
+
     def to_numbers(self) -> Array:
-        """All of it as one array (11,)."""
+        """All of it as one array (18,)."""
         flags = [self.hold.number, self.hold.arc_length, self.hold.fixes_tangent, self.rigid]
-        return np.concatenate([flags, self.position, self.frame])
+        last = [self.last_position, self.last_frame]
+        return np.concatenate([flags, self.position, self.frame, *last])
 
     @classmethod
     def from_numbers(cls, row: Array) -> Held:
         """The inverse of `to_numbers`."""
         hold = Hold(int(row[0]), float(row[1]), bool(row[2]))
-        return cls(hold, row[4:7].copy(), row[7:11].copy(), bool(row[3]))
+        position, frame, last_position, last_frame = np.split(row[4:].copy(), [3, 7, 10])
+        return cls(hold, position, frame, last_position, last_frame, bool(row[3]))
 
-    def moved(self, position: Array, frame: Array) -> Held:
-        """The same hold with another target."""
-        return replace(self, position=position, frame=frame)
+    @property
+    def moves(self) -> bool:
+        """The target is not where it was in the step before."""
+        return not (
+            np.array_equal(self.position, self.last_position)
+            and np.array_equal(self.frame, self.last_frame)
+        )
+
+    def arrived(self) -> Held:
+        """The same hold after a step."""
+        return replace(self, last_position=self.position, last_frame=self.frame)
+
+    def ahead(self, steps: float) -> tuple[Array, Array]:
+        """Pose that a target moving on as in this step reaches so many steps later."""
+        turn = rotation_vector(multiply(self.frame, conjugate(self.last_frame)))
+        position = self.position + steps * (self.position - self.last_position)
+        return position, multiply(exponential(steps * turn), self.frame)
 
 
 @dataclass(frozen=True)
@@ -49,6 +81,8 @@ class Load:
     arc_length: float
     force: Array
     moment: Array
+
+    WIDTH: ClassVar[int] = 7
 
     def to_numbers(self) -> Array:
         """All of it as one array (7,)."""
@@ -60,13 +94,13 @@ class Load:
         return cls(float(row[0]), row[1:4].copy(), row[4:7].copy())
 
 
-def stack_rows(items: list[Held] | list[Load], width: int) -> Array:
+def stack_rows(items: Sequence[Held | Load], width: int) -> Array:
     """Returns holds or loads as an array (k, width), for a snapshot."""
-    return np.array([item.to_numbers() for item in items]).reshape(-1, width)
+    return np.array([item.to_numbers() for item in items], dtype=np.float64).reshape(-1, width)
 
 
 def add_equality(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, along: float, held: Held, settings: dict[str, object]
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, along: float, held: Held, options: dict[str, object]
 ) -> None:
     """Ties a point of a segment to a mocap body: a weld for a clamp, else a connect.
 
@@ -77,7 +111,7 @@ def add_equality(
         body: the segment.
         along: distance of the point from the segment's first node (m).
         held: what holds it.
-        settings: solref and solimp of the constraint.
+        options: solref and solimp of the constraint.
     """
     number = held.hold.number
     body.add_site(name=f"held{number}", pos=[along, 0, 0])
@@ -92,7 +126,7 @@ def add_equality(
         objtype=mujoco.mjtObj.mjOBJ_SITE,
         name1=f"held{number}",
         name2=f"target{number}",
-        **settings,
+        **options,
     )
 
 
@@ -124,3 +158,22 @@ def compute_root_reaction(data: mujoco.MjData, held: Held, body: int) -> Reactio
     force = wrench[3:].copy()
     arm = data.subtree_com[body] - held.position
     return Reaction(force, wrench[:3] + np.cross(arm, force))
+
+
+def make_layout(
+    length: float, segments: int, held: Sequence[Held], *, clamp_correction: bool
+) -> ChainLayout:
+    """Returns the layout that clamps at the ends ask for."""
+    clamped = {item.hold.arc_length for item in held if item.hold.fixes_tangent}
+    first, last = clamp_correction and 0.0 in clamped, clamp_correction and length in clamped
+    return ChainLayout(length, segments, first, last)
+
+
+def check_segments(layout: ChainLayout, held: Sequence[Held]) -> None:
+    """Raises `InputError` for two holds on one rigid segment."""
+    arc_lengths = np.array([item.hold.arc_length for item in held])
+    index, _ = layout.locate(arc_lengths)
+    for k in range(len(held)):
+        if np.count_nonzero(index == index[k]) > 1:
+            h = layout.segment_length
+            raise InputError("arc_length", arc_lengths[k], f"on a segment (of {h:g} m) of its own")

@@ -41,8 +41,8 @@ class ChainLayout:
     @cached_property
     def nodes(self) -> Array:
         """Arc lengths of the nodes, shape (N + 1,), the first below 0 where corrected (m)."""
-        start = -0.5 if self.first_corrected else 0.0
-        return (start + np.arange(self.segments + 1)) * self.segment_length
+        steps = np.arange(self.segments + 1, dtype=np.float64) - 0.5 * self.first_corrected
+        return np.asarray(steps * self.segment_length)
 
     @cached_property
     def covered(self) -> Array:
@@ -62,7 +62,8 @@ class ChainLayout:
             return np.full(len(arc_lengths), at_joints[0])
         first = 2 * at_joints[0] - at_joints[1]
         last = 2 * at_joints[-1] - at_joints[-2]
-        return np.interp(arc_lengths, self.nodes, np.concatenate([[first], at_joints, [last]]))
+        values = np.concatenate([[first], at_joints, [last]])
+        return np.asarray(np.interp(arc_lengths, self.nodes, values))
 
 
 def multiply(left: Array, right: Array) -> Array:
@@ -82,7 +83,7 @@ def multiply(left: Array, right: Array) -> Array:
 
 def conjugate(quaternion: Array) -> Array:
     """Inverse of unit quaternions, shape (..., 4)."""
-    return quaternion * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.asarray(quaternion * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def rotation_vector(quaternion: Array) -> Array:
@@ -92,6 +93,12 @@ def rotation_vector(quaternion: Array) -> Array:
     angle = 2 * np.arctan2(sine, turned[..., :1])
     small = sine < 1e-9
     return np.asarray(turned[..., 1:] * np.where(small, 2.0, angle / np.where(small, 1.0, sine)))
+
+
+def exponential(vectors: Array) -> Array:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3), rad."""
+    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(angle / 2), np.sinc(angle / (2 * np.pi)) * vectors / 2], axis=-1)
 
 
 def rotation_matrix(quaternion: Array) -> Array:

@@ -1,8 +1,10 @@
 """Static equilibrium and small motions of a chain inside an mjModel.
 
-Unknowns are changes dq of the joint coordinates in MuJoCo's tangent space. With the generalised
-force g(q) of springs, gravity and loads at zero velocity, the hold errors c(q), their Jacobian J
-and the forces lambda of the holds, equilibrium is g + J^T lambda = 0 and c = 0.
+Unknowns x are the change of the first node and the rotation vectors of the segments in the world
+frame; relative rotations would do for planar chains, but in space they make a hose with little
+torsional stiffness look unstable wherever it is out of equilibrium. With the force f(x) of springs,
+gravity and loads at zero velocity, the hold errors c(x), their Jacobian J and the forces lambda of
+the holds, equilibrium is f + J^T lambda = 0 and c = 0.
 """
 
 from __future__ import annotations
@@ -13,13 +15,22 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.chain_layout import conjugate, multiply, rotation_vector
+from hose_mj.hoses.chain_kind import ChainKind
+from hose_mj.hoses.chain_layout import (
+    ChainLayout,
+    conjugate,
+    exponential,
+    multiply,
+    rotation_matrix,
+    rotation_vector,
+    turn_frame,
+)
 from hose_mj.hoses.model import Array, Linearization
 
-_MAX_TURN = 0.5  # rad a segment may turn in one iteration
-_NEWTON_ITERATIONS = 60
-_DAMPED_ITERATIONS = 400
-_TOLERANCE = 1e-9  # of the residual against the largest moments around, and of c against L
+_MOST_TURN, _LEAST_TURN = 0.5, 0.02  # rad a segment may turn in one iteration
+_PLAIN, _GUARDED = 60, 300  # most iterations
+_TOLERANCE = 1e-9  # of forces against the largest moments around, of hold errors against L
+_RANK = 1e-6  # holds weaker than this, against the strongest, are redundant
 
 
 @dataclass(frozen=True)
@@ -48,52 +59,86 @@ class StaticLoad:
     moment: Array
 
 
+@dataclass(frozen=True)
+class StaticChain:
+    """A compiled chain: its joints, model, body ids, whether its first segment is fixed, nodes."""
+
+    kind: ChainKind
+    model: mujoco.MjModel
+    bodies: np.ndarray
+    rooted: bool
+    layout: ChainLayout
+
+
 class StaticSystem:
-    """The functions g, c and J on a scratch mjData of its own.
+    """The functions f, c and J on a scratch mjData of its own.
 
     Args:
-        model: the hose.
-        qpos: where it starts.
+        chain: the hose.
+        start: its first node (3,), m.
+        frames: of its segments (N, 4).
         holds: equality constraints, as exact ones.
         loads: point loads.
-        scale: moment that makes residuals dimensionless (N m).
-        length: of the hose (m).
+
+    Attributes:
+        scale: sum of the moments that weight, loads and stiffness can make (N m).
+        conservative: no load is a moment; one that keeps its direction in space has no energy.
+        softest: the least stiffness over mass that a Newton step believes (1/s^2); a coordinate
+            without stiffness, such as the twist of a hose without GJ, stays where it is.
     """
 
     def __init__(
         self,
-        model: mujoco.MjModel,
-        qpos: Array,
+        chain: StaticChain,
+        start: Array,
+        frames: Array,
         holds: list[StaticHold],
         loads: list[StaticLoad],
-        scale: float,
-        length: float,
     ) -> None:
-        self.model, self.holds, self.loads = model, holds, loads
-        self.scale, self.length = scale, length
-        self.data = mujoco.MjData(model)
-        self.data.qpos[:] = qpos
-        mujoco.mj_forward(model, self.data)
+        self.chain, self.holds, self.loads = chain, holds, loads
+        self.model, self.data = chain.model, mujoco.MjData(chain.model)
+        self._freedoms = chain.kind.freedoms(chain.layout.segments, chain.rooted)
+        self.n_unknowns = len(self._freedoms)
+        length, mass = chain.layout.length, float(self.model.body_mass.sum())
+        pull = mass * float(np.linalg.norm(self.model.opt.gravity))
+        pull += sum(float(np.linalg.norm(load.force)) for load in loads)
+        bend = sum(float(np.linalg.norm(load.moment)) for load in loads)
+        self.scale = pull * length + bend + chain.kind.stiffness[1] / length
+        self.softest = 1e-6 * self.scale / (mass * length**2)
+        self.conservative = not any(np.any(load.moment) for load in loads)
+        self.set_pose((start, frames))
 
     @property
     def qpos(self) -> Array:
         """Present joint coordinates, a copy."""
         return np.array(self.data.qpos)
 
-    def set_qpos(self, qpos: Array) -> None:
-        """Moves there and updates the kinematics."""
-        self.data.qpos[:] = qpos
+    def set_pose(self, pose: tuple[Array, Array]) -> None:
+        """Moves the first node and the frames there and updates the kinematics."""
+        self.pose = pose
+        self.data.qpos[:] = self.chain.kind.to_qpos(*pose, self.chain.rooted)
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
     def advance(self, change: Array) -> None:
-        """Moves by a change of the joint coordinates (nv,)."""
-        qpos = self.qpos
-        mujoco.mj_integratePos(self.model, qpos, change, 1.0)
-        self.set_qpos(qpos)
+        """Moves by a change of the unknowns (n,)."""
+        full = change @ self._freedoms
+        turns = exponential(full[3:].reshape(-1, 3))
+        self.set_pose((self.pose[0] + full[:3], multiply(turns, self.pose[1])))
+
+    def drop_twist(self) -> None:
+        """Undoes the twist of the joints of a hose without GJ, but next to clamps."""
+        if self.chain.kind.stiffness[0] != 0.0:
+            return
+        start, frames = self.pose[0], self.pose[1].copy()
+        held = {hold.point.body for hold in self.holds if hold.frame is not None}
+        for k in range(1, len(frames)):
+            if self.chain.bodies[k] not in held:
+                frames[k] = turn_frame(frames[k - 1], rotation_matrix(frames[k])[:, 0])
+        self.set_pose((start, frames))
 
     def force(self, multipliers: Array) -> Array:
-        """g + J^T lambda here (nv,)."""
+        """F + J^T lambda here (n,)."""
         model, data = self.model, self.data
         bias, total = np.zeros(model.nv), np.zeros(model.nv)
         mujoco.mj_passive(model, data)
@@ -106,10 +151,10 @@ class StaticSystem:
             moment = np.zeros(3) if hold.frame is None else multipliers[row + 3 : row + 6]
             self._add_wrench(hold.point, multipliers[row : row + 3], moment, total)
             row += 3 if hold.frame is None else 6
-        return total
+        return self._spread(total)
 
     def errors(self) -> Array:
-        """c here (c,): metres and, for clamps, radians, in the world frame."""
+        """The hold errors c here (c,): metres and, for clamps, radians, in the world frame."""
         parts = [np.zeros(0)]
         for hold in self.holds:
             parts.append(self._world(hold.point) - hold.position)
@@ -119,63 +164,67 @@ class StaticSystem:
         return np.concatenate(parts)
 
     def constraints(self) -> Array:
-        """J here (c, nv)."""
-        rows = [np.zeros((0, self.model.nv))]
+        """Their Jacobian J here (c, n)."""
+        rows = [np.zeros((0, self.n_unknowns))]
         for hold in self.holds:
             linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
             point = self._world(hold.point)
             mujoco.mj_jac(self.model, self.data, linear, angular, point, hold.point.body)
-            rows.append(linear)
+            rows.extend(self._spread(row)[None] for row in linear)
             if hold.frame is not None:
-                rows.append(angular)
+                rows.extend(self._spread(row)[None] for row in angular)
         return np.concatenate(rows)
 
+    def idle_spins(self) -> Array:
+        """Rows (k, n) of the spins about tangents that nothing resists in a hose without GJ."""
+        tangents = self.data.xmat[self.chain.bodies].reshape(-1, 3, 3)[:, :, 0]
+        held = {hold.point.body for hold in self.holds if hold.frame is not None}
+        rows = np.zeros((len(tangents), self._freedoms.shape[1]))
+        for k, body in enumerate(self.chain.bodies):
+            if self.chain.kind.stiffness[0] == 0.0 and body not in held:
+                rows[k, 3 + 3 * k : 6 + 3 * k] = tangents[k]
+        rows = rows @ self._freedoms.T
+        return np.asarray(rows[np.abs(rows).max(axis=1) > 1e-9])
+
     def mass(self) -> Array:
-        """Mass matrix here (nv, nv)."""
+        """Mass matrix here (n, n)."""
         full = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_makeM(self.model, self.data)
         mujoco.mj_fullM(self.model, self.data, full)
-        return full
+        to_qvel = np.stack([self._spread(unit) for unit in np.eye(self.model.nv)])
+        return np.asarray(to_qvel.T @ full @ to_qvel)
 
     def stiffness(self, multipliers: Array, *, central: bool = False, width: float = 1e-6) -> Array:
-        """-d(g + J^T lambda)/dq at fixed lambda by finite differences (nv, nv)."""
-        here, start = self.qpos, self.force(multipliers)
+        """-d(f + J^T lambda)/dx at fixed lambda by finite differences (n, n)."""
+        here, start = self.pose, self.force(multipliers)
         columns = []
-        for k in range(self.model.nv):
-            change = np.zeros(self.model.nv)
-            change[k] = width
+        for change in width * np.eye(self.n_unknowns):
             self.advance(change)
             ahead = self.force(multipliers)
             behind, span = start, width
             if central:
-                self.set_qpos(here)
+                self.set_pose(here)
                 self.advance(-change)
                 behind, span = self.force(multipliers), 2 * width
             columns.append((behind - ahead) / span)
-            self.set_qpos(here)
+            self.set_pose(here)
         return np.stack(columns, axis=1)
 
     def largest_turn(self, change: Array) -> float:
-        """Largest rotation of any segment in a change of the coordinates (rad)."""
-        self.data.qvel[:] = change
-        mujoco.mj_comVel(self.model, self.data)
-        largest = float(np.linalg.norm(self.data.cvel[:, :3], axis=1).max())
-        self.data.qvel[:] = 0.0
-        mujoco.mj_comVel(self.model, self.data)
-        return largest
-
-    def estimate_multipliers(self) -> Array:
-        """The lambda that come closest to equilibrium here, measured in the mass metric."""
-        rows = self.constraints()
-        free = self.force(np.zeros(len(rows)))
-        weighted = np.linalg.solve(self.mass(), np.column_stack([rows.T, free]))
-        return np.asarray(-np.linalg.lstsq(rows @ weighted[:, :-1], rows @ weighted[:, -1])[0])
+        """Largest rotation of any segment in a change of the unknowns (rad)."""
+        turns = (change @ self._freedoms)[3:].reshape(-1, 3)
+        return float(np.linalg.norm(turns, axis=1).max())
 
     def residual(self, multipliers: Array) -> float:
         """Largest dimensionless residual of both equations."""
         force = np.abs(self.force(multipliers)).max(initial=0.0) / self.scale
-        errors = np.abs(self.errors()).max(initial=0.0) / min(self.length, 1.0)
+        errors = np.abs(self.errors()).max(initial=0.0) / min(self.chain.layout.length, 1.0)
         return float(max(force, errors))
+
+    def _spread(self, generalized: Array) -> Array:
+        axes = self.data.xmat[self.chain.bodies].reshape(-1, 3, 3)
+        full = self.chain.kind.spread(generalized, axes, self.chain.rooted)
+        return np.asarray(self._freedoms @ full)
 
     def _world(self, point: BodyPoint) -> Array:
         axes = self.data.xmat[point.body].reshape(3, 3)
@@ -186,67 +235,107 @@ class StaticSystem:
         mujoco.mj_applyFT(self.model, self.data, force, moment, where, point.body, total)
 
 
-def solve_equilibrium(system: StaticSystem) -> Array:
-    """Returns the qpos of a static equilibrium near the system's state.
+class Metric:
+    """Directions that the holds fix and leave, in coordinates where the mass matrix is 1.
 
-    Full Newton steps, capped by the rotation of the segments; where they fail, again from the start
-    with a mass-proportional damping that fades with the residual.
+    With M = L L^T, y = L^T dx and J L^-T = U S V^T, the columns of V beyond the rank are free.
+    Redundant holds (a straight hose held at both ends, a planar one out of its plane) lower the
+    rank; spins that nothing resists count as held.
+
+    Attributes:
+        multipliers: the lambda that come closest to equilibrium.
+    """
+
+    def __init__(self, system: StaticSystem) -> None:
+        self._factor = np.linalg.cholesky(system.mass())
+        holds, idle = system.constraints(), system.idle_spins()
+        rows = self._lower(np.concatenate([holds, idle]).T).T
+        left, singular, right = np.linalg.svd(rows)
+        rank = int(np.sum(singular > _RANK * singular.max(initial=0.0)))
+        self._singular, self._left = singular[:rank], left[:, :rank]
+        self._fixed, self._free = right[:rank].T, right[rank:].T
+        bare = self._lower(system.force(np.zeros(len(holds))))
+        forces = -self._left @ (self._fixed.T @ bare / self._singular)
+        self.multipliers: Array = forces[: len(holds)]
+
+    def newton_step(self, system: StaticSystem, guarded: bool) -> Array:
+        """Returns the dx that closes the holds and brings the rest to equilibrium.
+
+        Guarded, negative eigenvalues of the reduced stiffness change their sign, so that an
+        unstable equilibrium repels. That takes forces that have an energy.
+        """
+        stiffness = system.stiffness(self.multipliers)
+        if guarded:
+            stiffness = (stiffness + stiffness.T) / 2
+        stiffness = self._lower(self._lower(stiffness).T).T
+        errors = self._left[: len(self.multipliers)].T @ system.errors()
+        closing = -self._fixed @ (errors / self._singular)
+        force = self._lower(system.force(self.multipliers)) - stiffness @ closing
+        force, stiffness = self._free.T @ force, self._free.T @ stiffness @ self._free
+        if guarded:
+            values, vectors = np.linalg.eigh(stiffness)
+            values = np.maximum(np.abs(values), system.softest)
+            change = vectors @ (vectors.T @ force / values)
+        else:
+            change = np.linalg.solve(stiffness + system.softest * np.eye(len(force)), force)
+        return np.asarray(np.linalg.solve(self._factor.T, closing + self._free @ change))
+
+    def is_stable(self, system: StaticSystem) -> bool:
+        """No direction that the holds leave has a clearly negative stiffness."""
+        stiffness = self._lower(self._lower(system.stiffness(self.multipliers)).T)
+        reduced = self._free.T @ stiffness @ self._free
+        values = np.linalg.eigvalsh((reduced + reduced.T) / 2)
+        return bool(values.min(initial=0.0) > -1e3 * system.softest)
+
+    def _lower(self, right: Array) -> Array:
+        """L^-1 times a vector or matrix."""
+        return np.asarray(np.linalg.solve(self._factor, right))
+
+
+def solve_equilibrium(system: StaticSystem) -> Array:
+    """Brings the system to a static equilibrium near its state; returns lambda.
+
+    Plain Newton steps first. Where they fail or end in an unstable equilibrium, guarded ones follow
+    from the start; not with moments, which have no energy when they keep their direction in space.
+    The cable's own forces have none either where GJ differs from EI: last come more plain steps.
 
     Raises:
-        StepError: neither came to rest.
+        StepError: it did not come to rest.
     """
-    start = system.qpos
-    for damping, iterations in ((0.0, _NEWTON_ITERATIONS), (1.0, _DAMPED_ITERATIONS)):
-        system.set_qpos(start)
-        residual = _iterate(system, damping, iterations)
-        if residual < _TOLERANCE:
-            return system.qpos
+    start = system.pose
+    attempts = [(False, _PLAIN), (True, _GUARDED), (False, _GUARDED)]
+    for guarded, iterations in attempts if system.conservative else attempts[2:]:
+        system.set_pose(start)
+        multipliers = _iterate(system, guarded, iterations)
+        if multipliers is None:
+            continue
+        if iterations == _GUARDED or Metric(system).is_stable(system):
+            return multipliers
     raise StepError(
-        f"no static equilibrium was found: the residual is {residual:.1e} of the largest moments "
-        f"(wanted {_TOLERANCE:.0e}) after {_DAMPED_ITERATIONS} damped Newton steps; start from a "
-        "shape closer to it, or apply the loads in steps"
+        "no static equilibrium was found: a residual of "
+        f"{system.residual(Metric(system).multipliers):.1e} of the largest moments is left "
+        f"(wanted {_TOLERANCE:.0e}) after {_GUARDED} Newton steps; start from a shape closer to "
+        "it, or apply the loads in steps"
     )
 
 
-def _iterate(system: StaticSystem, damping: float, iterations: int) -> float:
-    """Newton's method from the system's state; returns the last residual."""
-    multipliers = system.estimate_multipliers()
-    first = residual = system.residual(multipliers)
-    for _ in range(iterations):
-        if residual < _TOLERANCE or not np.isfinite(residual):
-            break
-        stiffness = system.stiffness(multipliers)
-        if damping:
-            mass = system.mass()
-            shift = damping * np.abs(np.diag(stiffness)).max() / np.diag(mass).max()
-            stiffness = stiffness + shift * min(residual / first, 1.0) * mass
-        change, target = _newton_step(system, stiffness, multipliers)
-        part = min(1.0, _MAX_TURN / max(system.largest_turn(change), 1e-300))
-        system.advance(part * change)
-        multipliers = multipliers + part * (target - multipliers)
-        residual = system.residual(multipliers)
-    return residual
+def _iterate(system: StaticSystem, guarded: bool, iterations: int) -> Array | None:
+    """Newton's method, capped by the rotation of the segments; None where it does not converge.
 
-
-def _newton_step(
-    system: StaticSystem, stiffness: Array, multipliers: Array
-) -> tuple[Array, Array]:
-    """Solves K dq - J^T lambda = g, J dq = -c for dq and the new lambda.
-
-    Coordinates without stiffness (the twist of a hose without GJ) and redundant holds get a tiny
-    one each, which slows the last digits and changes no solution.
+    The cap shrinks while the residual grows.
     """
-    rows = system.constraints()
-    nv, n_rows = system.model.nv, len(rows)
-    matrix = np.zeros((nv + n_rows, nv + n_rows))
-    matrix[:nv, :nv] = stiffness + 1e-10 * system.scale * np.eye(nv)
-    matrix[:nv, nv:] = -rows.T
-    matrix[nv:, :nv] = rows
-    matrix[nv:, nv:] = 1e-10 * system.length**2 / system.scale * np.eye(n_rows)
-    free = system.force(np.zeros(n_rows))
-    right = np.concatenate([free, -system.errors() + np.diag(matrix)[nv:] * multipliers])
-    solution = np.linalg.solve(matrix, right)
-    return solution[:nv], solution[nv:]
+    cap, last = _MOST_TURN, np.inf
+    for _ in range(iterations):
+        system.drop_twist()
+        metric = Metric(system)
+        residual = system.residual(metric.multipliers)
+        if residual < _TOLERANCE:
+            return metric.multipliers
+        cap = min(2 * cap, _MOST_TURN) if residual < last else max(cap / 2, _LEAST_TURN)
+        last = residual
+        change = metric.newton_step(system, guarded)
+        system.advance(min(1.0, cap / max(system.largest_turn(change), 1e-300)) * change)
+    return None
 
 
 def linearize(system: StaticSystem) -> Linearization:
@@ -255,6 +344,5 @@ def linearize(system: StaticSystem) -> Linearization:
     The stiffness includes the change of the hold forces' directions, at the forces that come
     closest to equilibrium, and is symmetrised (exact at an equilibrium).
     """
-    multipliers = system.estimate_multipliers()
-    stiffness = system.stiffness(multipliers, central=True)
+    stiffness = system.stiffness(Metric(system).multipliers, central=True)
     return Linearization(system.mass(), (stiffness + stiffness.T) / 2, system.constraints())

@@ -7,26 +7,28 @@ state over.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError, StepError
-from hose_mj.hoses import chain_statics
+from hose_mj.errors import InputError
 from hose_mj.hoses.chain_holds import (
     Held,
     Load,
-    add_equality,
+    check_segments,
     compute_equality_reaction,
     compute_root_reaction,
     stack_rows,
 )
-from hose_mj.hoses.chain_layout import ChainLayout, transport_frames, turn_frame
-from hose_mj.hoses.chain_motion import ChainMass, ChainMotion
+from hose_mj.hoses.chain_kind import ChainKind
+from hose_mj.hoses.chain_layout import ChainLayout, rotation_matrix, transport_frames, turn_frame
+from hose_mj.hoses.chain_model import ChainModel
+from hose_mj.hoses.chain_motion import sample_velocity
+from hose_mj.hoses.chain_settings import ChainSettings, check_count
 from hose_mj.hoses.model import (
     Array,
     Curve,
@@ -36,124 +38,65 @@ from hose_mj.hoses.model import (
     Momentum,
     Reaction,
     check_arc_lengths,
+    check_curve_points,
     check_vector,
     sample_curve,
 )
-from hose_mj.hoses.spec import HoseSpec, check_number
-
-INTEGRATORS = ("euler", "implicit", "implicitfast", "discrete", "rk4")
-JACOBIANS = ("auto", "dense", "sparse")
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_BAD = [
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-]
+from hose_mj.hoses.spec import HoseSpec
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChainSettings:
-    """Settings that both chains share; the constructors of the hoses describe them."""
-
-    timestep: float
-    gravity: ArrayLike
-    segments: int
-    integrator: str
-    clamp_correction: bool
-    iterations: int
-    tolerance: float
-    jacobian: str
-    hold_solref: tuple[float, float] | None
-    hold_solimp: tuple[float, float, float, float, float]
-
-    def __post_init__(self) -> None:
-        check_number("timestep", self.timestep)
-        check_number("tolerance", self.tolerance, may_be_zero=True)
-        check_vector("gravity", self.gravity)
-        check_count("segments", self.segments, 2)
-        check_count("iterations", self.iterations, 1)
-        check_choice("integrator", self.integrator, INTEGRATORS)
-        check_choice("jacobian", self.jacobian, JACOBIANS)
-
-    def apply(self, option: Any) -> None:
-        """Writes the options of a model that is being made."""
-        option.timestep, option.gravity = self.timestep, np.asarray(self.gravity, dtype=float)
-        option.iterations, option.tolerance = self.iterations, self.tolerance
-        option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{self.integrator.upper()}")
-        option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{self.jacobian.upper()}")
-
-    def hold_options(self) -> dict[str, object]:
-        """solref and solimp of holds; by default a spring that closes a gap within one step."""
-        stiff = (-1.0 / self.timestep**2, -1.0 / self.timestep)
-        return {"solref": self.hold_solref or stiff, "solimp": self.hold_solimp}
-
-
-class MujocoChainHose(ABC):
+class MujocoChainHose:
     """The `HoseModel` protocol for a chain of rigid segments; inextensible, axial_stiffness unused.
+
+    Moving holds follow within some 1e-4 of the way per step for a hose with little damping. All of
+    MuJoCo's integrators but "discrete" leave implicit damping out of their constraint forces, so
+    where timestep times joint damping exceeds a segment's moment of inertia clamps turn late.
 
     Attributes:
         spec: what the hose is made of.
-        segments: their number.
-        model: the mjModel; made anew with every hold.
-        data: its mjData.
-        layout: arc lengths of the nodes.
+        settings: numerics.
         fallbacks: always 0; hoses with a solver of their own count here.
     """
 
-    def __init__(self, spec: HoseSpec, settings: ChainSettings) -> None:
+    def __init__(self, spec: HoseSpec, kind: ChainKind, settings: ChainSettings) -> None:
         for name in ("rest_strain", "rest_curvature", "drag"):
             if getattr(spec, name) != 0.0:
                 raise InputError(name, getattr(spec, name), f"0 for a {type(self).__name__}")
-        self.spec = spec
-        self.segments = settings.segments
-        self.fallbacks = 0
-        self._settings = settings
+        self.spec, self.settings, self.fallbacks = spec, settings, 0
+        self._kind = kind
         self._next_number = 0
-        self._held: list[Held] = []
-        self._loads: list[Load] = []
-        self._lay_straight()
+        straight = rotation_matrix(kind.base_frame)[:, 0]
+        self.reset(lambda s: s[:, None] * straight)
 
     @property
     def timestep(self) -> float:
         """Length of one step (s)."""
-        return self._settings.timestep
+        return self.settings.timestep
 
     @property
     def time(self) -> float:
         """Simulated time since the last reset (s)."""
         return float(self.data.time)
 
-    # What a kind of chain has to say about itself.
+    @property
+    def segments(self) -> int:
+        """Number of rigid segments."""
+        return self.settings.segments
 
     @property
-    @abstractmethod
-    def _base_frame(self) -> Array:
-        """Frame (4,) from which the first segment's is turned."""
+    def model(self) -> mujoco.MjModel:
+        """The mjModel; another one after each change of holds."""
+        return self._chain.model
 
     @property
-    @abstractmethod
-    def _stiffness(self) -> tuple[float, float]:
-        """GJ, EI of the joints (N m^2)."""
+    def data(self) -> mujoco.MjData:
+        """The mjData; another one after each change of holds."""
+        return self._chain.data
 
-    @abstractmethod
-    def _make_chain(
-        self, layout: ChainLayout, root: tuple[Array, Array] | None
-    ) -> tuple[mujoco.MjSpec, list[Any]]:
-        """Returns a model with the segments' bodies; `root` is the pose of a first one held fast."""
-
-    @abstractmethod
-    def _to_qpos(self, start: Array, frames: Array, rooted: bool) -> Array:
-        """Joint coordinates of a chain that starts at a point with these frames (N, 4)."""
-
-    @abstractmethod
-    def _to_qvel(self, velocity: Array, spins: Array, frames: Array, rooted: bool) -> Array:
-        """Joint velocities from the start's velocity and the spins (N, 3) in the world frame."""
-
-    def _check_reachable(self, name: str, points: Array) -> None:
-        """Raises `InputError` for points (k, 3) where this chain cannot be."""
-
-    def _check_direction(self, name: str, direction: Array) -> None:
-        """Raises `InputError` for a tangent that this chain cannot have."""
+    @property
+    def layout(self) -> ChainLayout:
+        """Arc lengths of the nodes; another one after each change of holds."""
+        return self._chain.layout
 
     # Shape, holds and loads.
 
@@ -164,13 +107,17 @@ class MujocoChainHose(ABC):
         """
         layout = ChainLayout(self.spec.length, self.segments)
         points = sample_curve(curve, self.spec.length, layout.nodes)
-        self._check_new_curve(points)
+        check_curve_points(points)
+        self._kind.check_points("curve", points)
         speeds = None if velocity is None else sample_velocity(velocity, layout)
-        self._held, self._loads = [], []
-        frames = transport_frames(points, self._base_frame)
-        self._build(layout, points[0], frames, np.zeros(3), np.zeros((self.segments, 3)), 0.0)
+        self._held: list[Held] = []
+        self._loads: list[Load] = []
+        self._chain = ChainModel(self._kind, self.spec, self.settings, [])
+        frames = transport_frames(points, self._kind.base_frame)
+        still = np.zeros((self.segments, 3))
+        self._chain.set_state(points[0], frames, still[0], still)
         if speeds is not None:
-            self._fit_velocity(speeds)
+            self._chain.fit_velocity(speeds)
 
     def clamp(
         self,
@@ -186,7 +133,7 @@ class MujocoChainHose(ABC):
         s = float(check_arc_lengths(arc_length, self.spec.length)[0])
         where = self._check_target(s, position)
         index = int(self.layout.locate(np.array([s]))[0][0])
-        frame = self._motion().frames[index]
+        frame = self._chain.motion().frames[index]
         if tangent is not None:
             frame = turn_frame(frame, self._check_tangent(tangent))
         return self._add_hold(s, where, frame, fixes_tangent=True)
@@ -214,10 +161,11 @@ class MujocoChainHose(ABC):
             if not hold.fixes_tangent:
                 raise InputError("tangent of an attachment", tangent, "None: only a clamp has one")
             frame = turn_frame(frame, self._check_tangent(tangent))
-        moved = held.moved(where, frame)
+        moved = replace(held, position=where, frame=frame)
         if held.rigid and (np.any(where != held.position) or np.any(frame != held.frame)):
-            self._rebuild([*self._held[:place], held.softened(), *self._held[place + 1 :]])
-            moved = moved.softened()
+            moved = replace(moved, rigid=False)
+            start = replace(held, rigid=False)
+            self._rebuild([*self._held[:place], start, *self._held[place + 1 :]])
         self._held[place] = moved
 
     def release(self, hold: Hold) -> None:
@@ -228,10 +176,14 @@ class MujocoChainHose(ABC):
     def reaction(self, hold: Hold) -> Reaction:
         """Force and moment of a hold on the hose at the end of the last step."""
         held = self._held[self._find(hold)]
-        self._update_forces()
+        self._chain.update_forces(self._loads)
         if held.rigid:
-            return compute_root_reaction(self.data, held, self._bodies[0])
-        return compute_equality_reaction(self.model, self.data, held, self._point(held.hold).body)
+            return compute_root_reaction(self.data, held, int(self._chain.bodies[0]))
+        if hold.number in self._chain.settled:
+            exact = self._chain.settled[hold.number]
+            return Reaction(exact.force.copy(), exact.moment.copy())
+        body = self._chain.point(hold.arc_length).body
+        return compute_equality_reaction(self.model, self.data, held, body)
 
     def apply_force(self, arc_length: float, force: ArrayLike) -> None:
         """Adds a point force (3,) N in the world frame that acts until `clear_loads`."""
@@ -246,8 +198,8 @@ class MujocoChainHose(ABC):
     def clear_loads(self) -> None:
         """Drops all point forces and moments; gravity stays."""
         self._loads = []
-        self.data.xfrc_applied[:] = 0.0
-        self._forget()
+        self._chain.write_loads([])
+        self._chain.forget()
 
     # Motion.
 
@@ -258,63 +210,62 @@ class MujocoChainHose(ABC):
             StepError: MuJoCo met a NaN or a huge number; the state before the call is kept.
         """
         check_count("n_steps", n_steps, 1)
-        before = self._get_state()
-        self._write_targets()
-        if not self._loads:
-            mujoco.mj_step(self.model, self.data, n_steps)
-        else:
-            for _ in range(n_steps):
-                self._write_loads()
-                mujoco.mj_step(self.model, self.data)
-        self._forget()
-        self._check_warnings(before)
+        self._chain.step(n_steps, self._held, self._loads)
+        self._held = [held.arrived() for held in self._held]
 
     def solve_static(self) -> None:
-        """Moves the hose to static equilibrium under its holds and loads, velocity zero."""
-        self._write_targets()
-        qpos = chain_statics.solve_equilibrium(self._static_system())
-        self.data.qpos[:] = qpos
-        self.data.qvel[:] = 0.0
-        self.data.qacc_warmstart[:] = 0.0
-        self._forget()
+        """Moves the hose to static equilibrium under its holds and loads, velocity zero.
+
+        Holds are exact here. Unstable equilibria are left, but not by a shape exactly in one, and
+        not where a moment acts.
+
+        Raises:
+            StepError: no equilibrium was found; the state before is kept.
+        """
+        self._chain.settle(self._held, self._loads)
 
     def linearize(self) -> Linearization:
-        """Mass, tangent stiffness and constraints in MuJoCo's joint velocities, at rest."""
-        return chain_statics.linearize(self._static_system())
+        """Mass, tangent stiffness and constraints at rest.
+
+        Coordinates: the first node and the rotation vectors of the segments, in the world frame,
+        without those of a first segment that is part of the world.
+        """
+        return self._chain.linearize(self._held, self._loads)
 
     # Queries.
 
     def position(self, arc_length: ArrayLike) -> Array:
         """Centre line, shape (k, 3), m: straight between the nodes."""
-        return self._motion().position(check_arc_lengths(arc_length, self.spec.length))
+        return self._chain.motion().position(self._arc_lengths(arc_length))
 
     def velocity(self, arc_length: ArrayLike) -> Array:
         """Velocity of the centre line, shape (k, 3), m/s."""
-        return self._motion().velocity(check_arc_lengths(arc_length, self.spec.length))
+        return self._chain.motion().velocity(self._arc_lengths(arc_length))
 
     def tangent(self, arc_length: ArrayLike) -> Array:
         """Unit tangent, shape (k, 3): the segment's, at a node the mean of its neighbours'."""
-        return self._motion().tangent(check_arc_lengths(arc_length, self.spec.length))
+        return self._chain.motion().tangent(self._arc_lengths(arc_length))
 
     def curvature(self, arc_length: ArrayLike) -> Array:
         """Angle of the joints over h (k,), 1/m: straight lines between and beyond the joints."""
-        return self._motion().curvature(check_arc_lengths(arc_length, self.spec.length))
+        return self._chain.motion().curvature(self._arc_lengths(arc_length))
 
     def tension(self, arc_length: ArrayLike) -> Array:
         """Axial force in the joints (k,), N, positive in tension; between and beyond, as above."""
-        s = check_arc_lengths(arc_length, self.spec.length)
-        self._update_forces()
-        tangents = self._motion().tangent(self.layout.nodes[1:-1])
-        on_rest = self.data.cfrc_int[self._bodies[1:], 3:]
+        s = self._arc_lengths(arc_length)
+        self._chain.update_forces(self._loads)
+        tangents = self._chain.motion().tangent(self.layout.nodes[1:-1])
+        on_rest = self.data.cfrc_int[self._chain.bodies[1:], 3:]
         return self.layout.interpolate(s, -np.einsum("ni,ni->n", on_rest, tangents))
 
     def energies(self) -> Energies:
         """Energies at the present state; `stretching` is 0."""
-        return self._motion().energies(self._mass, self._stiffness, self.model.opt.gravity)
+        gravity = self.model.opt.gravity
+        return self._chain.motion().energies(self._chain.mass, self._kind.stiffness, gravity)
 
     def momentum(self) -> Momentum:
         """Linear and angular momentum at the present state."""
-        return self._motion().momentum(self._mass)
+        return self._chain.motion().momentum(self._chain.mass)
 
     # State in and out.
 
@@ -324,9 +275,64 @@ class MujocoChainHose(ABC):
             "holds": stack_rows(self._held, Held.WIDTH),
             "loads": stack_rows(self._loads, Load.WIDTH),
             "next_number": self._next_number,
-            "state": self._get_state(),
+            "numbers": self._chain.get_numbers(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot of this hose."""
-        raise NotImplementedError
+        missing = {"holds", "loads", "next_number", "numbers"} - state.keys()
+        if missing:
+            raise InputError("state", sorted(state), f"a snapshot; {sorted(missing)} missing")
+        held = [Held.from_numbers(row) for row in np.asarray(state["holds"])]
+        chain = ChainModel(self._kind, self.spec, self.settings, held)
+        chain.set_numbers(np.asarray(state["numbers"]))
+        self._chain, self._held = chain, held
+        self._loads = [Load.from_numbers(row) for row in np.asarray(state["loads"])]
+        self._next_number = int(state["next_number"])
+
+    # Details.
+
+    def _arc_lengths(self, arc_length: ArrayLike) -> Array:
+        return check_arc_lengths(arc_length, self.spec.length)
+
+    def _check_target(self, arc_length: float, position: ArrayLike | None) -> Array:
+        """Where a hold is to be; by default where its point is now."""
+        if position is None:
+            return np.asarray(self.position(arc_length)[0])
+        where = check_vector("position", position)
+        self._kind.check_points("position", where[None])
+        return where
+
+    def _check_tangent(self, tangent: ArrayLike) -> Array:
+        direction = check_vector("tangent", tangent)
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            raise InputError("tangent", tangent, "a vector that is not zero")
+        self._kind.check_tangent(direction / length)
+        return np.asarray(direction / length)
+
+    def _find(self, hold: Hold) -> int:
+        """Place of a hold among those that act now."""
+        for place, held in enumerate(self._held):
+            if held.hold == hold:
+                return place
+        raise InputError("hold", hold, f"one of {[held.hold for held in self._held]}")
+
+    def _add_hold(self, s: float, where: Array, frame: Array, fixes_tangent: bool) -> Hold:
+        hold = Hold(self._next_number, s, fixes_tangent)
+        rigid = fixes_tangent and s == 0.0
+        self._rebuild([*self._held, Held(hold, where, frame, where, frame, rigid)])
+        self._next_number += 1
+        return hold
+
+    def _add_load(self, load: Load) -> None:
+        self._loads.append(load)
+        self._chain.forget()
+
+    def _rebuild(self, held: Sequence[Held]) -> None:
+        """Makes the model for these holds and lays it where the present one is."""
+        chain = ChainModel(self._kind, self.spec, self.settings, held)
+        check_segments(chain.layout, held)
+        chain.take_over(self._chain.motion(), held)
+        chain.data.time = self.time
+        self._chain, self._held = chain, list(held)

@@ -44,14 +44,21 @@ def draw_slopes(
     limits = axes.get_ylim()
     for slope in slopes:
         ends = np.array([coarse, fine])
-        levels = 1.4 * y.max() * (ends / coarse) ** (sign * slope)
+        levels = 2.0 * y.max() * (ends / coarse) ** (sign * slope)
         axes.plot(ends, levels, color="#999999", lw=0.8, ls=(0, (4, 3)), zorder=1)
         inside = np.clip(limits[0] * 1.3, levels.min(), levels.max())
         place = max(levels[1], inside)
         at = coarse * (place / levels[0]) ** (1.0 / (sign * slope))
-        axes.annotate(f"order {slope:g}", (at, place), color="#777777", fontsize=7.5, ha="right",
-                      va="bottom", xytext=(-3, 2), textcoords="offset points")  # fmt: skip
-    axes.set_ylim(limits[0], max(limits[1], 2.0 * y.max()))
+        axes.annotate(
+            f"order {slope:g}",
+            (at, place),
+            color="#777777",
+            fontsize=7.5,
+            va="bottom" if sign < 0.0 else "top",
+            xytext=(4, 2 if sign < 0.0 else -2),
+            textcoords="offset points",
+        )
+    axes.set_ylim(limits[0], max(limits[1], 2.8 * y.max()))
 
 
 def set_log(axes: Axes, x: bool, y: bool) -> None:

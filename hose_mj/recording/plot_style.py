@@ -43,6 +43,7 @@ STYLE: dict[str, Any] = {
     "lines.linewidth": 1.6,
     "lines.markersize": 5.5,
     "legend.frameon": False,
+    "legend.handlelength": 3.4,
     "legend.fontsize": 8.5,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
@@ -60,7 +61,7 @@ class Look:
 
 
 def choose_looks(labels: Sequence[str]) -> dict[str, Look]:
-    """Gives each label its model's colour and marker; labels of one model differ in their dashes."""
+    """Gives each label its model's colour and marker; labels of one model differ in dashes."""
     looks: dict[str, Look] = {}
     seen: dict[str | None, int] = {}
     for label in labels:
@@ -76,7 +77,7 @@ def choose_looks(labels: Sequence[str]) -> dict[str, Look]:
 @contextmanager
 def make_axes(title: str, size: tuple[float, float]) -> Iterator[tuple[Figure, Axes]]:
     """A figure of `size` inches with one axes, in the house style; no global state is touched."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
@@ -124,37 +125,45 @@ def label_line_ends(axes: Axes, ends: Sequence[tuple[float, str, str]]) -> None:
 
 
 def spread_apart(places: Any, gap: float) -> list[float]:
-    """Moves places in [0, 1] as little as a single sweep can, so that they are `gap` apart."""
+    """Moves places in [0, 1] by the least sum of squares that sets them `gap` apart.
+
+    Less gap * rank, sorted places need only not fall: isotonic regression, by pooling neighbours.
+    """
     places = np.clip(np.asarray(places, dtype=float), 0.0, 1.0)
     order = np.argsort(places, kind="stable")
-    moved = places[order]
-    for i in range(1, len(moved)):
-        moved[i] = max(moved[i], moved[i - 1] + gap)
-    overshoot = max(0.0, moved[-1] - 1.0)
-    moved[-1] -= overshoot
-    for i in range(len(moved) - 2, -1, -1):
-        moved[i] = min(moved[i], moved[i + 1] - gap)
-    result = np.empty_like(moved)
-    result[order] = moved
-    return [float(value) for value in result]
+    ranks = gap * np.arange(len(places))
+    pools: list[list[float]] = []
+    for value in places[order] - ranks:
+        pools.append([float(value)])
+        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
+            pools[-2:] = [pools[-2] + pools[-1]]
+    level = np.concatenate([np.full(len(pool), np.mean(pool)) for pool in pools])
+    moved = np.empty_like(level)
+    moved[order] = np.clip(level, 0.0, max(0.0, 1.0 - ranks[-1])) + ranks
+    return [float(value) for value in moved]
 
 
 def label_points(
-    figure: Figure, axes: Axes, labels: Sequence[tuple[float, float, str, str]]
+    figure: Figure,
+    axes: Axes,
+    labels: Sequence[tuple[float, float, str, str]],
+    lines: Sequence[tuple[Any, Any]] = (),
 ) -> int:
-    """Writes small labels beside points where there is room for them, and returns how many found it.
+    """Writes small labels beside points where there is room, and returns how many found it.
 
     Args:
         figure: of the axes.
         axes: limits must be final.
         labels: x, y, text, "#rrggbb".
+        lines: x (k,) and y (k,) of lines that labels keep off.
     """
     figure.draw_without_rendering()
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
-    spots = axes.transData.transform([(x, y) for x, y, _, _ in labels]) if labels else []
-    half = 3.5 * DPI / 72.0
-    taken = [Bbox.from_extents(x - half, y - half, x + half, y + half) for x, y in spots]
-    offsets = [(6, 5), (6, -5), (-6, 5), (-6, -5), (0, 9), (0, -9), (9, 0), (-9, 0)]
+    taken = _cover([axes.transData.transform([(x, y)]) for x, y, _, _ in labels], 3.5 * DPI / 72.0)
+    paths = [axes.transData.transform(np.column_stack([x, y])) for x, y in lines]
+    taken += _cover([_refine(path, 4.0) for path in paths], 1.0)
+    offsets = [(5, 4), (5, -4), (-5, 4), (-5, -4), (0, 8), (0, -8), (8, 0), (-8, 0)]
+    offsets += [(14, 8), (14, -8), (-14, 8), (-14, -8), (0, 18), (0, -18)]
     n_placed = 0
     for x, y, text, color in labels:
         for dx, dy in offsets:
@@ -175,6 +184,21 @@ def label_points(
                 break
             note.remove()
     return n_placed
+
+
+def _cover(paths: Sequence[Any], half: float) -> list[Bbox]:
+    """Squares of side 2 half about points in pixels."""
+    return [
+        Bbox.from_extents(x - half, y - half, x + half, y + half) for path in paths for x, y in path
+    ]
+
+
+def _refine(path: Any, step: float) -> Any:
+    """Points at most about `step` apart along a path (k, 2) in pixels."""
+    lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    places = np.linspace(0.0, along[-1], int(along[-1] / step) + 2)
+    return np.column_stack([np.interp(places, along, path[:, c]) for c in range(2)])
 
 
 def _holds(outer: Any, inner: Any) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.palette import LIMIT, format_hex
+from hose_mj.recording.palette import LIMIT, find_model, format_hex
 from hose_mj.recording.plot_parts import (
     PLAIN,
     add_model_legend,
@@ -62,7 +62,7 @@ class ErrorPoint:
 
 @dataclass(frozen=True)
 class WorkPoint:
-    """One setting of one model with its cost; as `ErrorPoint`, and wall seconds per simulated one."""
+    """One setting of one model with its cost: an `ErrorPoint` and wall over simulated time."""
 
     model: str
     label: str
@@ -89,6 +89,7 @@ def plot_work_precision(
     drawn = [p for p in points if is_positive(p.error) and is_positive(p.wall_s_per_sim_s)]
     check_some("points", points)
     looks = choose_looks(list(dict.fromkeys(p.model for p in points)))
+    lines = []
     with make_axes(title, (7.6, 4.6)) as (figure, axes):
         for model, raw in dict.fromkeys((p.model, p.is_raw) for p in drawn):
             group = [p for p in drawn if (p.model, p.is_raw) == (model, raw)]
@@ -96,16 +97,15 @@ def plot_work_precision(
             error = np.array([p.error for p in group])
             draw_markers(axes, cost, error, looks[model], raw)
             front = find_pareto_front(cost, error)
-            axes.plot(
-                cost[front], error[front], color=looks[model].color, ls=":" if raw else "-", lw=1.2
-            )
+            lines.append((cost[front], error[front]))
+            axes.plot(*lines[-1], color=looks[model].color, ls=":" if raw else "-", lw=1.2)
         set_log(axes, x=True, y=True)
         draw_levels(axes, reference_errors, horizontal=True)
         axes.set_xlabel("wall time per simulated time (s / s)")
         axes.set_ylabel("error")
         add_model_legend(axes, looks, any(p.is_raw for p in drawn), len(points) - len(drawn))
         notes = [(p.wall_s_per_sim_s, p.error, p.label, looks[p.model].color) for p in drawn]
-        label_points(figure, axes, notes)
+        label_points(figure, axes, notes, lines)
         return encode_png(figure)
 
 
@@ -130,7 +130,8 @@ def plot_convergence(
     """Error against resolution, both logarithmic, with each group's measured order in the legend.
 
     Args:
-        title, xlabel: texts.
+        title: text.
+        xlabel: text.
         groups: label to resolutions (k,) and errors (k,); labels draw in this order.
         slopes: orders drawn as thin guides from the coarsest point of all.
         finer_is_larger: True for numbers of points, False for step sizes.
@@ -179,6 +180,7 @@ def plot_shapes(
     """
     check_some("curves", curves)
     stacks = {label: check_curve(label, points) for label, points in curves.items()}
+    stacks = dict(sorted(stacks.items(), key=lambda item: find_model(item[0]) != "reference"))
     looks = choose_looks(list(curves))
     every = np.concatenate([stack.reshape(-1, 3) for stack in stacks.values()])[:, list(plane)]
     with make_axes(title, choose_size(every)) as (figure, axes):
@@ -188,7 +190,7 @@ def plot_shapes(
                     *shape[:, list(plane)].T,
                     color=looks[label].color,
                     ls=looks[label].dashes,
-                    lw=max(2.6 - 0.6 * rank, 1.0),
+                    lw=max(3.6 / 1.6**rank, 1.0),
                     alpha=0.25 + 0.75 * (k + 1) / len(stack) if len(stack) > 1 else 1.0,
                     label=label if k == len(stack) - 1 else None,
                 )
@@ -200,7 +202,8 @@ def plot_shapes(
         if times is not None:
             tips = next(iter(stacks.values()))[:, -1][:, list(plane)]
             notes = [(*tip, f"{t:.3g} s", PLAIN) for tip, t in zip(tips, times, strict=True)]
-            label_points(figure, axes, notes)
+            drawn = [shape[:, list(plane)].T for stack in stacks.values() for shape in stack]
+            label_points(figure, axes, notes, [(x, y) for x, y in drawn])
         return encode_png(figure)
 
 
@@ -228,7 +231,8 @@ def plot_series(
             ends.append((limit, "limit", format_hex(LIMIT)))
         if logy:
             set_log(axes, x=False, y=True)
-        axes.margins(x=0.0)
+        every = np.concatenate([np.ravel(times) for times, _ in groups.values()])
+        axes.set_xlim(float(every.min()), float(every.max()) or 1.0)
         axes.set_xlabel("time (s)")
         axes.set_ylabel(ylabel)
         figure.draw_without_rendering()
@@ -248,8 +252,12 @@ def plot_bars_vs_reference(
     """
     check_some("points", points)
     drawn = [p for p in points if is_positive(p.error)]
-    rows = list(dict.fromkeys((p.model, p.label) for p in points))
     looks = choose_looks(list(dict.fromkeys(p.model for p in points)))
+    rows = [
+        (m, label)
+        for m in looks
+        for label in dict.fromkeys(p.label for p in points if p.model == m)
+    ]
     with make_axes(title, (7.6, 1.5 + 0.26 * len(rows))) as (figure, axes):
         for height, row in enumerate(rows):
             group = [p for p in drawn if (p.model, p.label) == row]

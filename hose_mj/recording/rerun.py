@@ -44,8 +44,7 @@ _QUANTITIES = {
     "J": "Energy",
     "rad": "Angle",
 }
-_STILL = 3
-"""Pictures in a row that must agree before the viewer counts as done drawing."""
+_STILL = 3  # pictures in a row that must agree before the viewer counts as done drawing
 
 
 def write_recording(
@@ -134,7 +133,7 @@ def take_screenshot(
     Args:
         path_rrd: the recording.
         path_png: the picture, replaced atomically.
-        timeout_s: longest wait, viewer's start included.
+        timeout_s: longest wait, viewer's start included; one answer of its may add 15 s.
         size: width and height in pixels.
         at_s: simulated time to show, the last sample by default.
 
@@ -151,7 +150,7 @@ def take_screenshot(
         except HoseError:
             raise
         except Exception as error:  # the viewer's client raises plain kinds
-            viewer.check_alive()
+            viewer.check_alive(grace_s=3.0)
             raise HoseError(f"the viewer gave no picture of {path_rrd}: {error}") from error
     write_atomically(Path(path_png), picture)
 

@@ -33,9 +33,10 @@ class Viewer:
         """Where a client connects to."""
         return f"rerun+http://{_HOST}:{self.port}/proxy"
 
-    def check_alive(self) -> None:
-        """Raises `HoseError` with the reason if the viewer has ended."""
-        if self.process.poll() is not None:
+    def check_alive(self, grace_s: float = 0.0) -> None:
+        """Raises `HoseError` with the reason if the viewer has ended, or ends within `grace_s`."""
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(grace_s)
             raise HoseError(explain_failure(self.messages.read_text(errors="replace")))
 
     def wait_until_listening(self, deadline: float) -> None:
@@ -107,10 +108,11 @@ def find_free_port() -> int:
 def explain_failure(messages: str) -> str:
     """Says in one sentence why the viewer ended, from what it printed."""
     lowered = messages.lower()
-    if "adapter" in lowered or "vulkan" in lowered or "wgpu" in lowered:
+    if any(word in lowered for word in ("graphics adapter", "render context", "vulkan", "wgpu")):
         return (
             "the viewer found no graphics driver; a picture without a screen needs Mesa's software "
             f"Vulkan driver, on Debian: apt-get install {' '.join(DEBIAN_PACKAGES)}"
         )
-    last = [line.strip() for line in messages.splitlines() if line.strip()][-3:]
+    lines = [line.strip() for line in messages.splitlines() if line.strip()]
+    last = [line for line in lines if "panicked" in line] or lines[-3:]
     return f"the viewer ended by itself: {' | '.join(last) or 'it printed nothing'}"

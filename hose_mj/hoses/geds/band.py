@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.hoses.geds.compiled import kernel
 from hose_mj.hoses.model import Array
 
 
@@ -18,7 +18,7 @@ def make_band(n_control_points: int, dimension: int) -> Array:
     return np.zeros((n_control_points * dimension + 4 * dimension, 8 * dimension))
 
 
-@compiled
+@kernel
 def factorize(axes, size, band):  # type: ignore[no-untyped-def]
     """Replaces the first `size` columns by their Cholesky factor; False at a pivot that is not positive."""
     width = 4 * len(axes)
@@ -37,7 +37,7 @@ def factorize(axes, size, band):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled
+@kernel
 def solve_lower(axes, start, size, band, rhs):  # type: ignore[no-untyped-def]
     """Solves L y = rhs in place; rhs (size + 4 d) vanishes before `start` and after `size`."""
     width = 4 * len(axes)
@@ -48,7 +48,7 @@ def solve_lower(axes, start, size, band, rhs):  # type: ignore[no-untyped-def]
             rhs[j + k] -= value * band[j, k]
 
 
-@compiled
+@kernel
 def solve_upper(axes, size, band, rhs):  # type: ignore[no-untyped-def]
     """Solves L^T x = rhs in place; rhs (size + 4 d) vanishes after `size`."""
     width = 4 * len(axes)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.hoses.geds.compiled import kernel
 from hose_mj.hoses.model import Array
 
 SMALLEST_A = 0.01
@@ -44,115 +44,8 @@ class Elasticity(NamedTuple):
     damping_time: float
 
 
-@compiled
-def _stretch(A):  # type: ignore[no-untyped-def]
-    """|a| and its first two derivatives by A."""
-    if A >= SMALLEST_A:
-        stretch = np.sqrt(A)
-        return stretch, 0.5 / stretch, -0.25 / (A * stretch)
-    root = np.sqrt(SMALLEST_A)
-    u = A / SMALLEST_A
-    return (
-        root * (0.375 + u * (0.75 - 0.125 * u)),
-        (0.75 - 0.25 * u) / root,
-        -0.25 / (SMALLEST_A * root),
-    )
-
-
-@compiled
-def _inverse_square(A):  # type: ignore[no-untyped-def]
-    """1 / A^2 and its first two derivatives by A."""
-    if A >= SMALLEST_A:
-        inverse = 1.0 / A
-        square = inverse * inverse
-        return square, -2.0 * square * inverse, 6.0 * square * square
-    # 1 / phi^2 with phi / SMALLEST_A = 1/3 + u^2 - u^3/3.
-    u = A / SMALLEST_A
-    phi = SMALLEST_A * (1.0 / 3.0 + u * u - u * u * u / 3.0)
-    slope = 2.0 * u - u * u
-    bend = (2.0 - 2.0 * u) / SMALLEST_A
-    inverse = 1.0 / phi
-    square = inverse * inverse
-    return (
-        square,
-        -2.0 * square * inverse * slope,
-        square * (6.0 * square * slope * slope - 2.0 * inverse * bend),
-    )
-
-
-@compiled
-def _derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped-def]
-    """Writes a[g] = r' and b[g] = r'' at Gauss point g of span e; returns A, B, C.
-
-    Like all kernels here it indexes whole arrays: a slice would cost a reference count.
-    """
-    d = len(axes)
-    f0, f1 = tables.first[e, g, 0], tables.first[e, g, 1]
-    f2, f3 = tables.first[e, g, 2], tables.first[e, g, 3]
-    s0, s1 = tables.second[e, g, 0], tables.second[e, g, 1]
-    s2, s3 = tables.second[e, g, 2], tables.second[e, g, 3]
-    A = 0.0
-    B = 0.0
-    C = 0.0
-    for c in range(d):
-        k = e * d + c
-        x0, x1, x2, x3 = x[k], x[k + d], x[k + 2 * d], x[k + 3 * d]
-        ac = f0 * x0 + f1 * x1 + f2 * x2 + f3 * x3
-        bc = s0 * x0 + s1 * x1 + s2 * x2 + s3 * x3
-        a[g, c] = ac
-        b[g, c] = bc
-        A += ac * ac
-        B += bc * bc
-        C += ac * bc
-    return A, B, C
-
-
-@compiled
-def compute_strains(axes, tables, elasticity, x, strains):  # type: ignore[no-untyped-def]
-    """Writes the mean stretch strain and the linear mode of each span, less the rest strain, (S, 2).
-
-    The linear mode is kept at zero but in the first and last span.
-    """
-    n_spans = tables.first.shape[0]
-    a = np.empty((3, 3))
-    b = np.empty((3, 3))
-    for e in range(n_spans):
-        mean = -1.0 - elasticity.rest_strain[e]
-        linear = 0.0
-        for g in range(3):
-            A = _derivatives(axes, tables, e, g, x, a, b)[0]
-            stretch = tables.weights[g] * _stretch(A)[0]
-            mean += stretch
-            linear += tables.linear[g] * stretch
-        strains[e, 0] = mean
-        strains[e, 1] = linear if e == 0 or e == n_spans - 1 else 0.0
-
-
-@compiled
-def compute_energy(axes, tables, elasticity, x, strains):  # type: ignore[no-untyped-def]
-    """Returns the stretching and the bending energy (J); overwrites `strains` (S, 2)."""
-    compute_strains(axes, tables, elasticity, x, strains)
-    stretching = 0.0
-    bending = 0.0
-    a = np.empty((3, 3))
-    b = np.empty((3, 3))
-    for e in range(tables.first.shape[0]):
-        squares = strains[e, 0] ** 2 + strains[e, 1] ** 2
-        stretching += 0.5 * elasticity.axial_stiffness[e] * tables.span_length * squares
-        for g in range(3):
-            A, B, C = _derivatives(axes, tables, e, g, x, a, b)
-            square = max(A * B - C * C, 0.0) * _inverse_square(A)[0]
-            rest = elasticity.rest_curvature[e, g]
-            if len(axes) == 2 and rest != 0.0:
-                curvature = (a[g, 0] * b[g, 1] - a[g, 1] * b[g, 0]) * np.sqrt(_inverse_square(A)[0])
-                square = (curvature - rest) ** 2
-            weight = tables.weights[g] * tables.span_length
-            bending += 0.5 * elasticity.bending_stiffness[e, g] * weight * square
-    return stretching, bending
-
-
 class Span(NamedTuple):
-    """Work arrays of `assemble`: one span and its three Gauss points.
+    """Work arrays of one thread: one span and its three Gauss points.
 
     Attributes:
         a, b: r' and r'', (3, 3), Gauss point first.
@@ -191,7 +84,110 @@ def make_span() -> Span:
     )
 
 
-@compiled
+@kernel
+def _stretch(A):  # type: ignore[no-untyped-def]
+    """|a| and its first two derivatives by A."""
+    if A >= SMALLEST_A:
+        stretch = np.sqrt(A)
+        return stretch, 0.5 / stretch, -0.25 / (A * stretch)
+    root = np.sqrt(SMALLEST_A)
+    u = A / SMALLEST_A
+    return (
+        root * (0.375 + u * (0.75 - 0.125 * u)),
+        (0.75 - 0.25 * u) / root,
+        -0.25 / (SMALLEST_A * root),
+    )
+
+
+@kernel
+def _inverse_square(A):  # type: ignore[no-untyped-def]
+    """1 / A^2 and its first two derivatives by A."""
+    if A >= SMALLEST_A:
+        inverse = 1.0 / A
+        square = inverse * inverse
+        return square, -2.0 * square * inverse, 6.0 * square * square
+    # 1 / phi^2 with phi / SMALLEST_A = 1/3 + u^2 - u^3/3.
+    u = A / SMALLEST_A
+    phi = SMALLEST_A * (1.0 / 3.0 + u * u - u * u * u / 3.0)
+    slope = 2.0 * u - u * u
+    bend = (2.0 - 2.0 * u) / SMALLEST_A
+    inverse = 1.0 / phi
+    square = inverse * inverse
+    return (
+        square,
+        -2.0 * square * inverse * slope,
+        square * (6.0 * square * slope * slope - 2.0 * inverse * bend),
+    )
+
+
+@kernel
+def _derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped-def]
+    """Writes a[g] = r' and b[g] = r'' at Gauss point g of span e; returns A, B, C.
+
+    Like all kernels here it indexes whole arrays: a slice would cost a reference count.
+    """
+    d = len(axes)
+    f0, f1 = tables.first[e, g, 0], tables.first[e, g, 1]
+    f2, f3 = tables.first[e, g, 2], tables.first[e, g, 3]
+    s0, s1 = tables.second[e, g, 0], tables.second[e, g, 1]
+    s2, s3 = tables.second[e, g, 2], tables.second[e, g, 3]
+    A = 0.0
+    B = 0.0
+    C = 0.0
+    for c in range(d):
+        k = e * d + c
+        x0, x1, x2, x3 = x[k], x[k + d], x[k + 2 * d], x[k + 3 * d]
+        ac = f0 * x0 + f1 * x1 + f2 * x2 + f3 * x3
+        bc = s0 * x0 + s1 * x1 + s2 * x2 + s3 * x3
+        a[g, c] = ac
+        b[g, c] = bc
+        A += ac * ac
+        B += bc * bc
+        C += ac * bc
+    return A, B, C
+
+
+@kernel
+def compute_strains(axes, tables, elasticity, x, p, strains):  # type: ignore[no-untyped-def]
+    """Writes the mean stretch strain and the linear mode of each span, less the rest strain, (S, 2).
+
+    The linear mode is kept at zero but in the first and last span.
+    """
+    n_spans = tables.first.shape[0]
+    for e in range(n_spans):
+        mean = -1.0 - elasticity.rest_strain[e]
+        linear = 0.0
+        for g in range(3):
+            A = _derivatives(axes, tables, e, g, x, p.a, p.b)[0]
+            stretch = tables.weights[g] * _stretch(A)[0]
+            mean += stretch
+            linear += tables.linear[g] * stretch
+        strains[e, 0] = mean
+        strains[e, 1] = linear if e == 0 or e == n_spans - 1 else 0.0
+
+
+@kernel
+def compute_energy(axes, tables, elasticity, x, p, strains):  # type: ignore[no-untyped-def]
+    """Returns the stretching and the bending energy (J); overwrites `strains` (S, 2)."""
+    compute_strains(axes, tables, elasticity, x, p, strains)
+    stretching = 0.0
+    bending = 0.0
+    for e in range(tables.first.shape[0]):
+        squares = strains[e, 0] ** 2 + strains[e, 1] ** 2
+        stretching += 0.5 * elasticity.axial_stiffness[e] * tables.span_length * squares
+        for g in range(3):
+            A, B, C = _derivatives(axes, tables, e, g, x, p.a, p.b)
+            square = max(A * B - C * C, 0.0) * _inverse_square(A)[0]
+            rest = elasticity.rest_curvature[e, g]
+            if len(axes) == 2 and rest != 0.0:
+                curvature = (p.a[g, 0] * p.b[g, 1] - p.a[g, 1] * p.b[g, 0]) * np.sqrt(_inverse_square(A)[0])
+                square = (curvature - rest) ** 2
+            weight = tables.weights[g] * tables.span_length
+            bending += 0.5 * elasticity.bending_stiffness[e, g] * weight * square
+    return stretching, bending
+
+
+@kernel
 def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped-def]
     """Sets force and stiffness of Gauss point g to `weight` (EI times length) times the bending terms.
 
@@ -235,7 +231,7 @@ def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped
             entry[c1, c2, 9 + g] = both * (A * unit - aa)
 
 
-@compiled
+@kernel
 def _add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
     """Adds the Kelvin-Voigt force of bending, `weight` (EI tau times length) J^T J (a_rate, b_rate)."""
     a = p.a
@@ -272,7 +268,7 @@ def _add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
         )
 
 
-@compiled
+@kernel
 def _add_rest_curvature(g, weight, exact, p):  # type: ignore[no-untyped-def]
     """Adds `weight` (minus EI kappa_0 times length) times the signed curvature's terms (planar hose)."""
     a = (p.a[g, 0], p.a[g, 1])
@@ -298,7 +294,7 @@ def _add_rest_curvature(g, weight, exact, p):  # type: ignore[no-untyped-def]
             p.stiffness[c1, c2, 6 + g] += weight * exact * (-u * turn + 2.0 * u1 * by_b[c1] * a[c2])
 
 
-@compiled
+@kernel
 def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped-def]
     """Adds the force of a tension (N) at Gauss point g and, scaled by `exact`, its geometric stiffness."""
     a = p.a
@@ -311,7 +307,7 @@ def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped
             p.stiffness[c1, c2, g] += bend * a[g, c1] * a[g, c2] + (unit if c1 == c2 else 0.0)
 
 
-@compiled
+@kernel
 def _load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
     """Computes r', r'', |r'| and the derivatives of the two strain modes of span e."""
     for g in range(3):
@@ -331,7 +327,7 @@ def _load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
             p.modes[1, c, i] = l0 * f0 + l1 * f1 + l2 * f2
 
 
-@compiled
+@kernel
 def _load_rates(axes, tables, e, rate, p):  # type: ignore[no-untyped-def]
     """Computes the rates of r' and r'' at span e; returns those of the two strain modes."""
     mean = 0.0
@@ -346,7 +342,7 @@ def _load_rates(axes, tables, e, rate, p):  # type: ignore[no-untyped-def]
     return mean, linear
 
 
-@compiled
+@kernel
 def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # type: ignore[no-untyped-def]
     """Adds the span's force to the gradient and its stiffness to the band."""
     d = len(axes)
@@ -388,7 +384,7 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
                         band[start + i * d + c1, (j - i) * d + c2 - c1] += block[4 * i + j]
 
 
-@compiled
+@kernel
 def _add_outer(mode, c1, c2, axial, p):  # type: ignore[no-untyped-def]
     """Adds a strain mode's rank-one stiffness to the block of coordinates c1, c2."""
     m0, m1 = p.modes[mode, c2, 0], p.modes[mode, c2, 1]
@@ -401,7 +397,7 @@ def _add_outer(mode, c1, c2, axial, p):  # type: ignore[no-untyped-def]
         p.block[4 * i + 3] += along * m3
 
 
-@compiled
+@kernel
 def assemble(axes, tables, elasticity, x, rate, step, exact, p, gradient, band):  # type: ignore[no-untyped-def]
     """Adds strain energy and Kelvin-Voigt terms: dU + C rate to `gradient`, K + C / step to `band`.
 

@@ -12,15 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
-from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.hoses.geds.compiled import kernel
 from hose_mj.hoses.geds.solver import (
     DEPENDENT_HOLDS,
     DONE,
     NOT_FINITE,
-    NOT_POSITIVE,
     Limits,
-    _build,
     add_mass,
+    build,
     newton,
     solve_with_holds,
 )
@@ -62,199 +61,165 @@ def make_state(size: int) -> State:
     return State(*(np.zeros(size) for _ in range(5)), np.zeros(1))
 
 
-@compiled
-def _stage(axes, hose, stage, holds, fraction, loads, limits, x, work, count):  # type: ignore[no-untyped-def]
-    """One implicit stage with its fallback; x is the guess on entry, the solution on return."""
-    verdict, iterations, fallbacks = newton(
-        axes, hose, stage, holds, fraction, loads, 1.0, limits, x, work
-    )
-    count.iterations[0] += iterations
-    count.fallbacks[0] += fallbacks
-    if verdict == DONE or verdict == DEPENDENT_HOLDS:
-        return verdict
-    careful = Limits(limits.tolerance, 10 * limits.max_iterations, 0.5, limits.hold_weight)
-    for k in range(len(x)):
-        x[k] = stage[1][k]
-    verdict, iterations, fallbacks = newton(
-        axes, hose, stage, holds, fraction, loads, 1.0, careful, x, work
-    )
-    count.iterations[0] += iterations
-    count.fallbacks[0] += fallbacks + 1
+ATTEMPTS = 5
+"""The scheme as asked; backward Euler with a line search in 1, 8, 64 and 512 parts of the step."""
+
+
+@kernel
+def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-def]
+    """Writes X, V and the guess x of a stage; returns its length h and where in the step it ends.
+
+    work.x_now and work.v_now hold the state at the beginning of the step (or part of a step).
+    """
+    size = len(state.x)
+    if scheme == _BDF2:
+        for k in range(size):
+            work.X[k] = (4.0 * work.x_now[k] - state.x_old[k]) / 3.0
+            work.V[k] = (4.0 * work.v_now[k] - state.v_old[k]) / 3.0
+            work.x[k] = work.x_now[k] + dt * (work.v_now[k] + 0.5 * dt * state.a[k])
+        return 2.0 * dt / 3.0, 1.0
+    if scheme == _SDIRK2 and stage == 1:
+        h = _GAMMA * dt
+        rest = dt - h
+        for k in range(size):
+            v = (work.x[k] - work.X[k]) / h
+            work.X[k] = work.x_now[k] + rest * v
+            work.V[k] = work.v_now[k] + rest * (v - work.v_now[k]) / h
+            work.x[k] += rest * v
+        return h, 1.0
+    fraction = 1.0
+    if scheme == _SDIRK2:
+        fraction = _GAMMA
+    elif scheme == _MIDPOINT:
+        fraction = 0.5
+    h = fraction * dt
+    for k in range(size):
+        work.X[k] = work.x_now[k]
+        work.V[k] = work.v_now[k]
+        work.x[k] = work.x_now[k] + h * (work.v_now[k] + 0.5 * h * state.a[k])
+    return h, fraction
+
+
+@kernel
+def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, count):  # type: ignore[no-untyped-def]
+    """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
+
+    Returns the verdict and the length of the last stage.
+    """
+    size = len(state.x)
+    for k in range(size):
+        work.x_now[k] = state.x[k]
+        work.v_now[k] = state.v[k]
+    n_stages = 2 if scheme == _SDIRK2 else 1
+    h = dt
+    for part in range(parts):
+        for stage in range(n_stages):
+            h, end = _set_up_stage(scheme, stage, dt / parts, state, work)
+            fraction = (part + end) / parts
+            verdict, iterations, fallbacks = newton(
+                axes, hose, (h, work.X, work.V), holds, fraction, loads, 1.0, limits, work.x, work
+            )
+            count.iterations[0] += iterations
+            count.fallbacks[0] += fallbacks
+            if verdict != DONE:
+                return verdict, h
+        for k in range(size):
+            v = (work.x[k] - work.X[k]) / h
+            if scheme == _MIDPOINT:
+                work.x_now[k] = 2.0 * work.x[k] - work.X[k]
+                work.v_now[k] = 2.0 * v - work.V[k]
+            else:
+                work.x_now[k] = work.x[k]
+                work.v_now[k] = v
+    return DONE, h
+
+
+@kernel
+def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, count):  # type: ignore[no-untyped-def]
+    """One step; where the scheme's Newton fails, backward Euler with a line search in ever finer parts."""
+    careful = Limits(limits.tolerance, 3 * limits.max_iterations, np.inf, True, 0.0)
+    verdict = NOT_FINITE
+    for attempt in range(ATTEMPTS):
+        first = attempt == 0
+        if first and scheme == _BDF2 and state.started[0] == 0.0:
+            use = _BACKWARD_EULER
+        else:
+            use = scheme if first else _BACKWARD_EULER
+        parts = 1 if attempt < 2 else 8 ** (attempt - 1)
+        verdict, h = _try_step(
+            axes, hose, holds, loads, limits if first else careful, use, dt, parts, state, work, count
+        )
+        if verdict == DEPENDENT_HOLDS:
+            return verdict
+        if verdict == DONE:
+            for k in range(len(state.x)):
+                state.x_old[k] = state.x[k]
+                state.v_old[k] = state.v[k]
+                state.a[k] = ((work.x[k] - work.X[k]) / h - work.V[k]) / h
+                state.x[k] = work.x_now[k]
+                state.v[k] = work.v_now[k]
+            state.started[0] = 1.0 if first else 0.0
+            return verdict
+        count.fallbacks[0] += 1
     return verdict
 
 
-class Scratch(NamedTuple):
-    """A step in the making, flat (n d,): nothing reaches `State` before the step is done."""
-
-    x: Array
-    X: Array
-    V: Array
-
-
-@compiled
-def _predict(dt, state, x):  # type: ignore[no-untyped-def]
-    """Guess of x at the end of the step."""
-    for k in range(len(x)):
-        x[k] = state.x[k] + dt * (state.v[k] + 0.5 * dt * state.a[k])
-
-
-@compiled
-def _commit(h, state, s):  # type: ignore[no-untyped-def]
-    """Moves a finished implicit step of stage length h into the state."""
-    for k in range(len(s.x)):
-        v = (s.x[k] - s.X[k]) / h
-        state.x_old[k] = state.x[k]
-        state.v_old[k] = state.v[k]
-        state.a[k] = (v - s.V[k]) / h
-        state.x[k] = s.x[k]
-        state.v[k] = v
-    state.started[0] = 1.0
-
-
-@compiled
-def _step_backward_euler(axes, hose, holds, loads, limits, dt, state, s, work, count):  # type: ignore[no-untyped-def]
-    s.X[:] = state.x
-    s.V[:] = state.v
-    _predict(dt, state, s.x)
-    verdict = _stage(axes, hose, (dt, s.X, s.V), holds, 1.0, loads, limits, s.x, work, count)
-    if verdict == DONE:
-        _commit(dt, state, s)
-    return verdict
-
-
-@compiled
-def _step_bdf2(axes, hose, holds, loads, limits, dt, state, s, work, count):  # type: ignore[no-untyped-def]
-    if state.started[0] == 0.0:
-        return _step_backward_euler(axes, hose, holds, loads, limits, dt, state, s, work, count)
-    for k in range(len(s.x)):
-        s.X[k] = (4.0 * state.x[k] - state.x_old[k]) / 3.0
-        s.V[k] = (4.0 * state.v[k] - state.v_old[k]) / 3.0
-    h = 2.0 * dt / 3.0
-    _predict(dt, state, s.x)
-    verdict = _stage(axes, hose, (h, s.X, s.V), holds, 1.0, loads, limits, s.x, work, count)
-    if verdict == DONE:
-        _commit(h, state, s)
-        return verdict
-    # The memory of a step is no help where the motion breaks: one step without it.
-    count.fallbacks[0] += 1
-    return _step_backward_euler(axes, hose, holds, loads, limits, dt, state, s, work, count)
-
-
-@compiled
-def _step_sdirk2(axes, hose, holds, loads, limits, dt, state, s, work, count):  # type: ignore[no-untyped-def]
-    h = _GAMMA * dt
-    s.X[:] = state.x
-    s.V[:] = state.v
-    _predict(h, state, s.x)
-    verdict = _stage(axes, hose, (h, s.X, s.V), holds, _GAMMA, loads, limits, s.x, work, count)
-    if verdict != DONE:
-        return verdict
-    rest = (1.0 - _GAMMA) * dt
-    for k in range(len(s.x)):
-        v = (s.x[k] - s.X[k]) / h
-        s.X[k] = state.x[k] + rest * v
-        s.V[k] = state.v[k] + rest * (v - state.v[k]) / h
-        s.x[k] += rest * v
-    verdict = _stage(axes, hose, (h, s.X, s.V), holds, 1.0, loads, limits, s.x, work, count)
-    if verdict == DONE:
-        _commit(h, state, s)
-    return verdict
-
-
-@compiled
-def _step_midpoint(axes, hose, holds, loads, limits, dt, state, s, work, count):  # type: ignore[no-untyped-def]
-    h = 0.5 * dt
-    s.X[:] = state.x
-    s.V[:] = state.v
-    _predict(h, state, s.x)
-    verdict = _stage(axes, hose, (h, s.X, s.V), holds, 0.5, loads, limits, s.x, work, count)
-    if verdict != DONE:
-        return verdict
-    for k in range(len(s.x)):
-        v = (s.x[k] - s.X[k]) / h
-        state.a[k] = (v - s.V[k]) / h
-        state.x_old[k] = state.x[k]
-        state.v_old[k] = state.v[k]
-        state.x[k] = 2.0 * s.x[k] - s.X[k]
-        state.v[k] = 2.0 * v - s.V[k]
-    state.started[0] = 1.0
-    return verdict
-
-
-@compiled
-def _accelerate(axes, hose, holds, loads, x, work):  # type: ignore[no-untyped-def]
-    """Writes M^-1 (f - dU + G^T lambda) with G M^-1 (...) = work.shift into work.gradient."""
-    # A stage of infinite length has no inertia: what it builds is the force.
-    _build(axes, hose, (np.inf, x, x), loads, 1.0, True, x, work)
-    work.band[:, :] = 0.0
-    add_mass(axes, hose.mass, 1.0, work.band)
-    if not factorize(axes, len(x), work.band):
-        return NOT_POSITIVE
-    if not solve_with_holds(axes, holds, len(x), work):
-        return DEPENDENT_HOLDS
-    return DONE
-
-
-@compiled
-def _step_verlet(axes, hose, holds, loads, limits, dt, state, s, work, count):  # type: ignore[no-untyped-def]
+@kernel
+def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-untyped-def]
     """Velocity Verlet with holds on positions and velocities (RATTLE); no damping, no drag."""
     width = 4 * len(axes)
-    for k in range(len(s.x)):
-        s.x[k] = state.x[k] + dt * state.v[k]
-    for row in range(len(holds.start)):
-        gap = holds.after[row]
-        for k in range(width):
-            gap -= holds.rows[row, k] * s.x[holds.start[row] + k]
-        work.shift[row] = 2.0 * gap / (dt * dt)
-    verdict = _accelerate(axes, hose, holds, loads, state.x, work)
-    if verdict != DONE:
-        return verdict
-    for k in range(len(s.x)):
-        s.V[k] = state.v[k] + 0.5 * dt * work.gradient[k]
-        s.x[k] = state.x[k] + dt * s.V[k]
-    for row in range(len(holds.start)):
-        speed = (holds.after[row] - holds.before[row]) / dt
-        for k in range(width):
-            speed -= holds.rows[row, k] * s.V[holds.start[row] + k]
-        work.shift[row] = 2.0 * speed / dt
-    verdict = _accelerate(axes, hose, holds, loads, s.x, work)
-    if verdict != DONE:
-        return verdict
-    for k in range(len(s.x)):
-        if not np.isfinite(s.x[k] + work.gradient[k]):
-            return NOT_FINITE
-    for k in range(len(s.x)):
+    size = len(state.x)
+    for k in range(size):
+        work.X[k] = state.x[k]
+        work.V[k] = state.v[k]
+    for half in range(2):
+        # First half: lambda such that x_(n+1) meets the holds. Second: such that v_(n+1) does.
+        for row in range(len(holds.start)):
+            gap = holds.after[row] if half == 0 else (holds.after[row] - holds.before[row]) / dt
+            for k in range(width):
+                at = holds.start[row] + k
+                aim = work.X[at] + dt * work.V[at] if half == 0 else work.V[at]
+                gap -= holds.rows[row, k] * aim
+            work.shift[row] = 2.0 * gap / (dt * dt if half == 0 else dt)
+        # A stage of infinite length has no inertia: what it builds is the force.
+        build(axes, hose, (np.inf, work.X, work.V), loads, 1.0, True, work.X, work)
+        for k in range(size):
+            for m in range(width):
+                work.band[k, m] = 0.0
+        add_mass(axes, hose.mass, 1.0, work.band)
+        factorize(axes, size, work.band)
+        if not solve_with_holds(axes, holds, size, work):
+            return DEPENDENT_HOLDS
+        for k in range(size):
+            work.V[k] += 0.5 * dt * work.gradient[k]
+            if half == 0:
+                work.X[k] += dt * work.V[k]
+            if not np.isfinite(work.X[k] + work.V[k]):
+                return NOT_FINITE
+    for k in range(size):
         state.x_old[k] = state.x[k]
         state.v_old[k] = state.v[k]
-        state.x[k] = s.x[k]
-        state.v[k] = s.V[k] + 0.5 * dt * work.gradient[k]
         state.a[k] = work.gradient[k]
+        state.x[k] = work.X[k]
+        state.v[k] = work.V[k]
     state.started[0] = 1.0
     return DONE
 
 
-@compiled
+@kernel
 def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, work, count):  # type: ignore[no-untyped-def]
     """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
 
     A step that fails leaves the state at the step before it; count.steps says how many were done.
     Eleven arguments: it is the one entry to the dynamics.
     """
-    size = len(state.x)
-    s = Scratch(np.empty(size), np.empty(size), np.empty(size))
     for _ in range(n_steps):
-        if scheme == _BDF2:
-            verdict = _step_bdf2(axes, hose, holds, loads, limits, dt, state, s, work, count)
-        elif scheme == _BACKWARD_EULER:
-            verdict = _step_backward_euler(
-                axes, hose, holds, loads, limits, dt, state, s, work, count
-            )
-        elif scheme == _SDIRK2:
-            verdict = _step_sdirk2(axes, hose, holds, loads, limits, dt, state, s, work, count)
-        elif scheme == _MIDPOINT:
-            verdict = _step_midpoint(axes, hose, holds, loads, limits, dt, state, s, work, count)
+        if scheme == _VERLET:
+            verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
         else:
-            verdict = _step_verlet(axes, hose, holds, loads, limits, dt, state, s, work, count)
+            verdict = _step_implicit(
+                axes, hose, holds, loads, limits, scheme, dt, state, work, count
+            )
         if verdict != DONE:
             return verdict
         count.steps[0] += 1

@@ -19,7 +19,7 @@ import numpy as np
 
 from hose_mj.hoses.geds.band import factorize, make_band, solve_lower, solve_upper
 from hose_mj.hoses.geds.basis import Tables
-from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.hoses.geds.compiled import kernel
 from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
 from hose_mj.hoses.model import Array
 
@@ -83,6 +83,7 @@ class Limits(NamedTuple):
         tolerance: largest move of a control point in the last iteration (m).
         max_iterations: Newton iterations at most.
         rotation_cap: largest turn of a tangent in one iteration (rad).
+        line_search: True to shorten steps that run past the lowest point along them.
         hold_weight: weight of G^T G in the matrix, relative to its mean diagonal; above 0 where
             the hose alone has rigid motions (statics).
     """
@@ -90,11 +91,16 @@ class Limits(NamedTuple):
     tolerance: float
     max_iterations: int
     rotation_cap: float
+    line_search: bool
     hold_weight: float
 
 
 class Work(NamedTuple):
-    """Work arrays of one hose and the multipliers of its holds."""
+    """Work arrays of one hose and the multipliers of its holds.
+
+    x, X and V are a stage, x_now and v_now a step in the making, flat (n d,): nothing reaches the
+    state before the step is done.
+    """
 
     span: Span
     gradient: Array
@@ -104,6 +110,13 @@ class Work(NamedTuple):
     schur: Array
     multipliers: Array
     shift: Array
+    residual: Array
+    step: Array
+    x: Array
+    X: Array
+    V: Array
+    x_now: Array
+    v_now: Array
 
 
 def make_work(n_control_points: int, dimension: int, n_rows: int) -> Work:
@@ -118,10 +131,11 @@ def make_work(n_control_points: int, dimension: int, n_rows: int) -> Work:
         np.zeros((n_rows, n_rows)),
         np.zeros(n_rows),
         np.zeros(size),
+        *(np.zeros(n_control_points * dimension) for _ in range(7)),
     )
 
 
-@compiled
+@kernel
 def multiply_mass(axes, mass, factor, x, out):  # type: ignore[no-untyped-def]
     """Adds factor M x to out; x and out flat, the first n d entries count."""
     d = len(axes)
@@ -136,7 +150,7 @@ def multiply_mass(axes, mass, factor, x, out):  # type: ignore[no-untyped-def]
                 out[j * d + c] += weight * x[(j + k) * d + c]
 
 
-@compiled
+@kernel
 def add_mass(axes, mass, factor, band):  # type: ignore[no-untyped-def]
     """Adds factor M to a band."""
     d = len(axes)
@@ -146,15 +160,15 @@ def add_mass(axes, mass, factor, band):  # type: ignore[no-untyped-def]
                 band[j * d + c, k * d] += factor * mass[j, k]
 
 
-@compiled
-def add_moments(axes, loads, exact, x, gradient, band):  # type: ignore[no-untyped-def]
+@kernel
+def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
     """Subtracts the generalised force of the point moments, M x a / A on a = r', from the gradient.
 
     Its derivative goes into the band: all of it in the plane, its symmetric part in space.
     """
     d = len(axes)
-    a = np.empty(3)
-    turn = np.empty(3)
+    a = work.span.a[0]
+    turn = work.span.b[0]
     for k in range(len(loads.moment_start)):
         start = loads.moment_start[k]
         A = 0.0
@@ -174,18 +188,18 @@ def add_moments(axes, loads, exact, x, gradient, band):  # type: ignore[no-untyp
                 turn[c] = (m1 * a[(c + 2) % 3] - m2 * a[(c + 1) % 3]) / A
         for i in range(4):
             for c1 in range(d):
-                gradient[start + i * d + c1] -= loads.moment_basis[k, i] * turn[c1]
+                work.gradient[start + i * d + c1] -= loads.moment_basis[k, i] * turn[c1]
                 if not exact:
                     continue
                 for j in range(i + 1):
                     weight = loads.moment_basis[k, i] * loads.moment_basis[k, j] / A
                     for c2 in range(d if j < i else c1 + 1):
                         bend = turn[c1] * a[c2] + a[c1] * turn[c2]
-                        band[start + j * d + c2, (i - j) * d + c1 - c2] += weight * bend
+                        work.band[start + j * d + c2, (i - j) * d + c1 - c2] += weight * bend
 
 
-@compiled
-def _build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
+@kernel
+def build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
     """Fills work.gradient with the residual without holds, work.band with its derivative."""
     h, X, V = stage
     size = len(x)
@@ -214,10 +228,10 @@ def _build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-
         work.band,
     )
     if len(loads.moment_start) > 0:
-        add_moments(axes, loads, exact, x, work.gradient, work.band)
+        add_moments(axes, loads, exact, x, work)
 
 
-@compiled
+@kernel
 def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untyped-def]
     """Adds weight G^T G to the band and G^T (g - G x) to the right-hand side; lambda is the same.
 
@@ -240,7 +254,7 @@ def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untype
                 work.band[start + j, i - j] += along * holds.rows[row, i]
 
 
-@compiled
+@kernel
 def solve_with_holds(axes, holds, size, work):  # type: ignore[no-untyped-def]
     """Solves K dx - G^T lambda = -gradient, G dx = shift with the factor in work.band.
 
@@ -282,7 +296,7 @@ def solve_with_holds(axes, holds, size, work):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled
+@kernel
 def _solve_row(axes, start, size, band, rows, row):  # type: ignore[no-untyped-def]
     """`solve_lower` for one row of a matrix of right-hand sides."""
     width = 4 * len(axes)
@@ -293,7 +307,7 @@ def _solve_row(axes, start, size, band, rows, row):  # type: ignore[no-untyped-d
             rows[row, j + k] -= value * band[j, k]
 
 
-@compiled
+@kernel
 def _solve_dense(matrix, rhs):  # type: ignore[no-untyped-def]
     """Cholesky solve in place with the lower half of a small matrix; False if it is singular."""
     m = len(rhs)
@@ -322,7 +336,7 @@ def _solve_dense(matrix, rhs):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled
+@kernel
 def _largest_turn(axes, tables, x, shift):  # type: ignore[no-untyped-def]
     """Largest angle (small-angle estimate) by which a shift of x turns a tangent."""
     d = len(axes)
@@ -346,7 +360,7 @@ def _largest_turn(axes, tables, x, shift):  # type: ignore[no-untyped-def]
     return largest
 
 
-@compiled
+@kernel
 def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  # type: ignore[no-untyped-def]
     """Newton's iteration on x in place; returns (verdict, iterations, fallbacks).
 
@@ -364,40 +378,70 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
         work: work arrays; multipliers on return.
     """
     size = len(x)
-    width = 4 * len(axes)
     fallbacks = 0
-    for iteration in range(1, limits.max_iterations + 1):
-        exact = True
-        while True:
-            _build(axes, hose, stage, loads, scale, exact, x, work)
-            for row in range(len(holds.start)):
-                before = holds.before[row]
-                value = before + fraction * (holds.after[row] - before)
-                for k in range(width):
-                    value -= holds.rows[row, k] * x[holds.start[row] + k]
-                work.shift[row] = value
-            if limits.hold_weight > 0.0:
-                _add_hold_weight(axes, holds, limits.hold_weight, size, work)
-            if factorize(axes, size, work.band):
-                break
+    exact = True
+    shortened = 0
+    factor = 0.0
+    slope = 0.0
+    iteration = 1
+    while True:
+        build(axes, hose, stage, loads, scale, exact, x, work)
+        # Holds that are not met yet come first: the line search starts from a point that meets them.
+        if limits.line_search and exact and iteration > 2 and shortened < 12:
+            turned = 0.0
+            for k in range(size):
+                turned += work.gradient[k] * work.step[k]
+            if turned > 0.5 * abs(slope):
+                shorter = factor * min(max(slope / (slope - turned), 0.1), 0.7)
+                for k in range(size):
+                    x[k] += (shorter - factor) * work.step[k]
+                factor = shorter
+                shortened += 1
+                continue
+        _prepare_holds(axes, holds, fraction, limits.hold_weight, x, work)
+        if not factorize(axes, size, work.band):
             if not exact:
                 return NOT_POSITIVE, iteration, fallbacks
             exact = False
             fallbacks += 1
+            continue
+        for k in range(size):
+            work.residual[k] = work.gradient[k]
         if not solve_with_holds(axes, holds, size, work):
             return DEPENDENT_HOLDS, iteration, fallbacks
         largest = 0.0
+        slope = 0.0
         for k in range(size):
-            largest = max(largest, abs(work.gradient[k]))
+            work.step[k] = work.gradient[k]
+            slope += work.residual[k] * work.step[k]
+            largest = max(largest, abs(work.step[k]))
         if not np.isfinite(largest):
             return NOT_FINITE, iteration, fallbacks
         factor = 1.0
         if limits.rotation_cap < np.inf:
-            turn = _largest_turn(axes, hose.tables, x, work.gradient)
+            turn = _largest_turn(axes, hose.tables, x, work.step)
             if turn > limits.rotation_cap:
                 factor = limits.rotation_cap / turn
         for k in range(size):
-            x[k] += factor * work.gradient[k]
+            x[k] += factor * work.step[k]
         if factor == 1.0 and largest <= limits.tolerance:
             return DONE, iteration, fallbacks
-    return NOT_CONVERGED, limits.max_iterations, fallbacks
+        if iteration == limits.max_iterations:
+            return NOT_CONVERGED, iteration, fallbacks
+        iteration += 1
+        exact = True
+        shortened = 0
+
+
+@kernel
+def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-untyped-def]
+    """Writes g - G x into work.shift and adds the holds' weight to the matrix."""
+    width = 4 * len(axes)
+    for row in range(len(holds.start)):
+        before = holds.before[row]
+        value = before + fraction * (holds.after[row] - before)
+        for k in range(width):
+            value -= holds.rows[row, k] * x[holds.start[row] + k]
+        work.shift[row] = value
+    if weight > 0.0:
+        _add_hold_weight(axes, holds, weight, len(x), work)

@@ -1,0 +1,155 @@
+"""`SplineBody`: the matter and the state of one hose, and all that can be asked of them.
+
+It knows nothing of holds, loads or time steps; `GedsHose` adds those.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import energy, mechanics, schemes
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.model import (
+    Array,
+    Curve,
+    Energies,
+    Momentum,
+    check_arc_lengths,
+    check_vector,
+    sample_curve,
+)
+from hose_mj.hoses.spec import HoseSpec
+
+
+class SplineBody:
+    """A hose as control points and their velocities.
+
+    Args:
+        spec: the hose.
+        spline: its knots and its plane.
+        gravity: (3,) m/s^2.
+
+    Attributes:
+        spec, gravity: as given.
+
+    Raises:
+        InputError: gravity out of the plane, a rest curvature in space.
+    """
+
+    def __init__(self, spec: HoseSpec, spline: Spline, gravity: ArrayLike) -> None:
+        _check_rest_curvature(spec, spline.plane)
+        self.spec = spec
+        self.gravity = check_vector("gravity", gravity).copy()
+        spline.check_in_plane("gravity", self.gravity, 0.0)
+        self._spline = spline
+        self._axes = spline.axes
+        self._hose = mechanics.make_constants(spec, spline.knots)
+        uniform = np.tile(self.gravity[spline.dims], spline.n_control_points)
+        self._weight = self._multiply_mass(uniform)
+        self._state = schemes.make_state(spline.size)
+        self._span = energy.make_span()
+        self._strains = np.zeros((spline.n_control_points - 3, 2))
+
+    @property
+    def control_points(self) -> Array:
+        """Control points (n, 3) in the world frame (m), a copy."""
+        return self._spline.to_world(self._state.x) + self._spline.offset
+
+    def position(self, arc_length: ArrayLike) -> Array:
+        """Centre line, shape (k, 3), m, world frame (thesis A.2)."""
+        return self._evaluate(arc_length, self._state.x) + self._spline.offset
+
+    def velocity(self, arc_length: ArrayLike) -> Array:
+        """Velocity of the centre line, shape (k, 3), m/s, world frame."""
+        return self._evaluate(arc_length, self._state.v)
+
+    def tangent(self, arc_length: ArrayLike) -> Array:
+        """Unit tangent, shape (k, 3), world frame."""
+        slope = self._evaluate(arc_length, self._state.x, 1)
+        return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12))
+
+    def tension(self, arc_length: ArrayLike) -> Array:
+        """Axial force, shape (k,), N: linear between the means of the spans' middles."""
+        s = check_arc_lengths(arc_length, self.spec.length)
+        self._run_on_strains(energy.compute_strains)
+        stiffness = self.spec.axial_stiffness
+        return mechanics.interpolate_tension(self._strains, stiffness, self.spec.length, s)
+
+    def curvature(self, arc_length: ArrayLike) -> Array:
+        """Material curvature |r' x r''| / |r'|^2, shape (k,), 1/m."""
+        a = self._evaluate(arc_length, self._state.x, 1)
+        b = self._evaluate(arc_length, self._state.x, 2)
+        squares = np.maximum(np.sum(a * a, axis=1), 1e-12)
+        return np.asarray(np.linalg.norm(np.cross(a, b), axis=1) / squares)
+
+    def energies(self) -> Energies:
+        """Energies at the present state (thesis A.10, A.15)."""
+        stretching, bending = self._run_on_strains(energy.compute_energy)
+        kinetic = 0.5 * float(self._state.v @ self._multiply_mass(self._state.v))
+        gravitational = -float(self._state.x @ self._weight)
+        gravitational -= self.spec.mass * float(self._spline.offset @ self.gravity)
+        return Energies(kinetic, float(stretching), float(bending), 0.0, gravitational)
+
+    def momentum(self) -> Momentum:
+        """Linear and angular momentum about the world's origin."""
+        momenta = self._spline.to_world(self._multiply_mass(self._state.v))
+        angular = np.cross(self.control_points, momenta).sum(axis=0)
+        return Momentum(momenta.sum(axis=0), angular)
+
+    def attachment_jacobian(self, arc_lengths: ArrayLike) -> Array:
+        """J_pr of thesis A.24: N_i at each of l arc lengths, shape (n, l)."""
+        return self._spline.compute_jacobian(check_arc_lengths(arc_lengths, self.spec.length))
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _lay(self, curve: Curve, velocity: Curve | None) -> None:
+        """Makes the state anew from a curve and a velocity; changes nothing if one is refused."""
+        arc_lengths = np.linspace(0.0, self.spec.length, self._spline.n_control_points)
+        points = sample_curve(curve, self.spec.length, arc_lengths)
+        offset = self._spline.find_offset(points)
+        state = schemes.make_state(self._spline.size)
+        state.x[:] = self._spline.interpolate(arc_lengths, points)
+        if velocity is not None:
+            speeds = self._sample_velocity(velocity, arc_lengths)
+            state.v[:] = self._spline.interpolate(arc_lengths, speeds)
+        self._state, self._spline.offset = state, offset
+
+    def _sample_velocity(self, velocity: Curve, arc_lengths: Array) -> Array:
+        values = velocity(arc_lengths) if callable(velocity) else velocity
+        n = len(arc_lengths)
+        valid = f"finite numbers (m/s), shape (3,) or ({n}, 3)"
+        try:
+            speeds = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError("velocity", values, valid) from None
+        if speeds.shape not in ((3,), (n, 3)):
+            raise InputError("shape of velocity", speeds.shape, valid)
+        if not np.all(np.isfinite(speeds)):
+            raise InputError("velocity", values, valid)
+        if self._spline.dimension == 2:
+            for speed in np.atleast_2d(speeds):
+                self._spline.check_in_plane("velocity", speed, 1e-9)
+        return np.broadcast_to(speeds, (n, 3))
+
+    def _evaluate(self, arc_length: ArrayLike, flat: Array, derivative: int = 0) -> Array:
+        s = check_arc_lengths(arc_length, self.spec.length)
+        return self._spline.evaluate(s, flat, derivative)
+
+    def _multiply_mass(self, flat: Array) -> Array:
+        return mechanics.multiply_mass(self._axes, self._hose, flat)
+
+    def _run_on_strains(self, kernel: Any) -> Any:
+        hose, x = self._hose, self._state.x
+        return mechanics.run_kernel(
+            *(kernel, self._axes, hose.tables, hose.elasticity, x, self._span, self._strains)
+        )
+
+
+def _check_rest_curvature(spec: HoseSpec, plane: str | None) -> None:
+    if plane is None and spec.rest_curvature != 0.0:
+        valid = "0 for a hose in space (a signed rest curvature needs plane='xy', 'xz' or 'yz')"
+        raise InputError("rest_curvature", spec.rest_curvature, valid)

@@ -1,0 +1,91 @@
+"""`LoadSet`: gravity, point forces and point moments on a hose, as the kernels read them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.hoses.geds import solver
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.model import Array, check_vector
+
+
+class LoadSet:
+    """All dead loads of one hose; gravity never leaves.
+
+    Args:
+        spline: the hose's geometry.
+        weight: generalised force of gravity on the control points, flat (n d,), N.
+
+    Attributes:
+        loads: what the kernels read; made anew by every change.
+    """
+
+    def __init__(self, spline: Spline, weight: Array) -> None:
+        self._spline = spline
+        self._weight = weight
+        self.clear()
+
+    def clear(self) -> None:
+        """Drops all point forces and moments."""
+        self._forces: list[tuple[float, Array]] = []
+        self._moments: list[tuple[float, Array]] = []
+        self._rebuild()
+
+    def add_force(self, arc_length: float, force: ArrayLike) -> None:
+        """Adds a point force (3,) N, world frame: f N_i(s) on control point i (thesis A.27).
+
+        Raises:
+            InputError: a place off the hose, a vector that is not finite or leaves its plane.
+        """
+        place = self._spline.check_place(arc_length)
+        vector = check_vector("force", force).copy()
+        self._spline.check_in_plane("force", vector, 0.0)
+        self._forces.append((place, vector))
+        self._rebuild()
+
+    def add_moment(self, arc_length: float, moment: ArrayLike) -> None:
+        """Adds a point moment (3,) N m, world frame; what lies along the tangent is lost.
+
+        Raises:
+            InputError: a place off the hose, a vector that is not finite, or one that would turn a
+                planar hose out of its plane.
+        """
+        place = self._spline.check_place(arc_length)
+        vector = check_vector("moment", moment).copy()
+        self._spline.check_along_normal("moment", vector)
+        self._moments.append((place, vector))
+        self._rebuild()
+
+    def snapshot(self) -> dict[str, Any]:
+        """All point forces and moments as (arc length, vector) pairs."""
+        return {
+            "forces": [(place, vector.copy()) for place, vector in self._forces],
+            "moments": [(place, vector.copy()) for place, vector in self._moments],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot."""
+        self._forces = [(place, vector.copy()) for place, vector in state["forces"]]
+        self._moments = [(place, vector.copy()) for place, vector in state["moments"]]
+        self._rebuild()
+
+    def _rebuild(self) -> None:
+        d = self._spline.dimension
+        force = self._weight.copy()
+        for place, vector in self._forces:
+            starts, values = self._spline.compute_basis(np.array([place]))
+            spread = np.outer(values[0, 0], vector[self._spline.dims]).ravel()
+            force[starts[0] : starts[0] + 4 * d] += spread
+        places = np.array([place for place, _ in self._moments])
+        starts, values = self._spline.compute_basis(places)
+        moments = np.zeros((len(places), 3))
+        for k, (_, vector) in enumerate(self._moments):
+            if d == 3:
+                moments[k] = vector
+            else:
+                moments[k, 0] = vector @ self._spline.normal
+        slopes = np.ascontiguousarray(values[:, 1])
+        self.loads = solver.Loads(force, starts, slopes, moments)

@@ -1,0 +1,158 @@
+"""What stands between `GedsHose` and the kernels: constants, equilibrium, tangents, tension."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hose_mj.hoses.geds import basis, energy, solver
+from hose_mj.hoses.geds.compiled import compile_notice
+from hose_mj.hoses.model import Array
+from hose_mj.hoses.spec import HoseSpec
+
+MOST_LOAD_STEPS = 64
+_STATIC_TOLERANCE = 1e-10
+_STATIC_ITERATIONS = 400
+_STATIC_TURN = 0.5
+"""Largest turn of a tangent in one static iteration (rad): beats an energy line search near
+inextensibility."""
+_called: set[tuple[str, int]] = set()
+
+
+def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
+    """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
+    key = kernel.__name__, len(axes)
+    if key in _called:
+        return kernel(axes, *arguments)
+    with compile_notice("GEDS kernels"):
+        answer = kernel(axes, *arguments)
+    _called.add(key)
+    return answer
+
+
+def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
+    """Returns what the kernels need to know of a uniform hose with these knots (n + 4,)."""
+    with compile_notice("GEDS kernels"):
+        tables = basis.make_tables(knots)
+    n_spans = len(tables.first)
+    elasticity = energy.Elasticity(
+        np.full(n_spans, spec.axial_stiffness, dtype=np.float64),
+        np.full((n_spans, 3), spec.bending_stiffness, dtype=np.float64),
+        np.full(n_spans, spec.rest_strain, dtype=np.float64),
+        np.full((n_spans, 3), spec.rest_curvature, dtype=np.float64),
+        float(spec.damping_time),
+    )
+    mass = basis.make_mass(knots, spec.linear_density)
+    return solver.Hose(tables, elasticity, mass, float(spec.drag / spec.linear_density))
+
+
+def multiply_mass(axes: tuple[float, ...], hose: solver.Hose, flat: Array) -> Array:
+    """Returns M times a flat vector (n d,)."""
+    out = np.zeros(len(flat))
+    run_kernel(solver.multiply_mass, axes, hose.mass, 1.0, flat, out)
+    return out
+
+
+class Equilibrium(NamedTuple):
+    """Answer of `find_equilibrium`: a verdict of solver.py, control points (n d,), counters."""
+
+    verdict: int
+    x: Array
+    iterations: int
+    fallbacks: int
+
+
+def find_equilibrium(
+    axes: tuple[float, ...],
+    hose: solver.Hose,
+    holds: solver.Holds,
+    loads: solver.Loads,
+    x: Array,
+    work: solver.Work,
+    load_steps: int,
+) -> Equilibrium:
+    """Newton's iteration for statics, capped by the turn of the tangents.
+
+    The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails. The
+    holds' multipliers are left in work.multipliers.
+    """
+    limits = solver.Limits(
+        _STATIC_TOLERANCE * hose.tables.span_length * len(hose.tables.first),
+        _STATIC_ITERATIONS,
+        _STATIC_TURN,
+        False,
+        1.0,
+    )
+    stage = (np.inf, x.copy(), np.zeros_like(x))
+    verdict, all_iterations, all_fallbacks = solver.NOT_CONVERGED, 0, 0
+    shape = x.copy()
+    while verdict != solver.DONE and load_steps <= MOST_LOAD_STEPS:
+        shape = x.copy()
+        for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
+            verdict, iterations, fallbacks = run_kernel(
+                *(solver.newton, axes, hose, stage, holds, 1.0, loads, scale, limits, shape, work)
+            )
+            all_iterations += iterations
+            all_fallbacks += fallbacks
+            if verdict != solver.DONE:
+                break
+        load_steps *= 2
+    return Equilibrium(verdict, shape, all_iterations, all_fallbacks)
+
+
+def build_tangent(
+    axes: tuple[float, ...],
+    hose: solver.Hose,
+    loads: solver.Loads,
+    x: Array,
+    v: Array,
+    work: solver.Work,
+) -> None:
+    """Writes dU + C v less the point moments to work.gradient, its derivative by x to work.band.
+
+    Forces, gravity, inertia and holds are left out; so is the derivative of the damping.
+    """
+    work.gradient[:] = 0.0
+    work.band[:] = 0.0
+    work.rate[: len(x)] = v
+    tables, elasticity = hose.tables, hose.elasticity
+    run_kernel(
+        *(energy.assemble, axes, tables, elasticity, x, work.rate, np.inf, True),
+        *(work.span, work.gradient, work.band),
+    )
+    run_kernel(solver.add_moments, axes, loads, True, x, work)
+
+
+def make_dense(band: Array, size: int, width: int) -> Array:
+    """Returns the symmetric matrix (size, size) of a lower band stored by columns."""
+    dense = np.zeros((size, size))
+    for k in range(width):
+        rows = np.arange(k, size)
+        dense[rows, rows - k] = band[: size - k, k]
+        dense[rows - k, rows] = band[: size - k, k]
+    return dense
+
+
+def make_dense_rows(holds: solver.Holds, size: int) -> Array:
+    """Returns the rows of the holds as a matrix (m, size)."""
+    dense = np.zeros((len(holds.start), size))
+    width = holds.rows.shape[1]
+    for row, start in enumerate(holds.start):
+        dense[row, start : start + width] = holds.rows[row]
+    return dense
+
+
+def interpolate_tension(strains: Array, axial_stiffness: float, length: float, s: Array) -> Array:
+    """Returns the axial force (k,) N at arc lengths s (k,) from the spans' strain modes (S, 2).
+
+    Linear between the means at the spans' middles; the end spans know their own slope, sqrt(3) xi
+    times the linear mode, xi = -1 .. 1.
+    """
+    mean, linear = strains.T * axial_stiffness
+    middles = (np.arange(len(mean)) + 0.5) * length / len(mean)
+    nodes = np.concatenate([[0.0], middles, [length]])
+    first = mean[0] - np.sqrt(3.0) * linear[0]
+    last = mean[-1] + np.sqrt(3.0) * linear[-1]
+    return np.asarray(np.interp(s, nodes, np.concatenate([[first], mean, [last]])))

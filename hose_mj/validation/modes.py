@@ -1,0 +1,61 @@
+"""Small motions of any hose model: frequencies and critical loads from `HoseModel.linearize`."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from hose_mj.hoses.model import Array, Linearization
+
+_SAME = 1e-4
+"""Relative distance below which two frequencies count as one mode seen in two planes."""
+
+
+def compute_frequencies(small: Linearization, n_modes: int, above: float) -> Array:
+    """Returns the first distinct angular frequencies, shape (n_modes,), rad/s.
+
+    Args:
+        small: mass, stiffness and constraints.
+        n_modes: how many; modes in two planes of one frequency count once.
+        above: frequencies below this are rigid motions (rad/s).
+    """
+    basis = _free_basis(small)
+    stiffness = basis.T @ small.stiffness @ basis
+    squares = eigh(
+        0.5 * (stiffness + stiffness.T), basis.T @ small.mass @ basis, eigvals_only=True
+    )
+    frequencies = np.sqrt(np.maximum(squares, 0.0))
+    distinct: list[float] = []
+    for value in frequencies[frequencies > above]:
+        if not distinct or value > distinct[-1] * (1.0 + _SAME):
+            distinct.append(float(value))
+    return np.array(distinct[:n_modes])
+
+
+def compute_critical_load(
+    unloaded: Linearization, pulled: Linearization, pull: float, above: float
+) -> float:
+    """Returns the smallest thrust at which the straight state loses its stability (N).
+
+    The stiffness of a straight, nearly inextensible hose is linear in its tension, K0 + T Kg, so two
+    linearizations, unloaded and under a pull, give the thrusts P with K0 z = P Kg z. Solved in the
+    form K0 z = theta (K0 + pull Kg) z, P = pull theta / (1 - theta), whose right side is positive
+    definite; rigid rotations have theta = 0 and are left out, motions that swing below `above`
+    (rad/s) even under the pull, such as a spin about the axis, before.
+    """
+    basis = _free_basis(unloaded)
+    right = basis.T @ pulled.stiffness @ basis
+    squares, modes = eigh(0.5 * (right + right.T), basis.T @ pulled.mass @ basis)
+    basis = basis @ modes[:, squares > above**2]
+    left = basis.T @ unloaded.stiffness @ basis
+    right = basis.T @ pulled.stiffness @ basis
+    theta = eigh(0.5 * (left + left.T), 0.5 * (right + right.T), eigvals_only=True)
+    lowest = float(np.min(theta[theta > 1e-3]))
+    return pull * lowest / (1.0 - lowest)
+
+
+def _free_basis(small: Linearization) -> Array:
+    """Orthonormal basis of the motions that the constraints allow, (m, free)."""
+    if len(small.constraints) == 0:
+        return np.eye(len(small.mass))
+    return np.asarray(null_space(small.constraints, rcond=1e-10))

@@ -1,0 +1,278 @@
+"""Runs cases: statics in one go, motions along ladders of time steps, timed in interleaved rounds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hose_mj.errors import StepError
+from hose_mj.hoses.model import Array, HoseModel
+from hose_mj.validation.cases import STIFFENING, Case
+from hose_mj.validation.settings import STAGNATION, Grid, Setting, list_ladders, list_static
+
+LOST = 0.5
+"""An error above this fraction counts as unstable even where no number overflowed."""
+N_DRAWN = 41
+"""Points along the hose that are kept for pictures."""
+
+
+@dataclass
+class Outcome:
+    """What one setting reached in one case.
+
+    Attributes:
+        case: its id.
+        setting: how it was run.
+        error: largest error as a fraction (of the reference value or of the hose's length).
+        reference: "closed form" or "converged".
+        wall_s: least wall time of the whole run, moving of holds included, reading excluded (s).
+        sim_s: simulated time (s); None in statics.
+        fallbacks: of the solver.
+        times: sampled instants (k,).
+        points: centre lines at those instants, (k, N_DRAWN, 3).
+        values: the probe at those instants, (k, q).
+    """
+
+    case: str
+    setting: Setting
+    error: float
+    reference: str
+    wall_s: float
+    sim_s: float | None
+    fallbacks: int
+    times: Array = field(repr=False)
+    points: Array = field(repr=False)
+    values: Array = field(repr=False)
+
+    @property
+    def wall_s_per_sim_s(self) -> float | None:
+        """Wall time per simulated second; None in statics."""
+        return None if self.sim_s is None else self.wall_s / self.sim_s
+
+    def to_record(self) -> dict[str, object]:
+        """The record of docs/documents.md."""
+        return {
+            "case": self.case,
+            "model": self.setting.model,
+            "scheme": self.setting.scheme,
+            "resolution": self.setting.resolution,
+            "timestep": self.setting.timestep,
+            "error": self.error,
+            "reference": self.reference,
+            "clamp_corrected": self.setting.clamp_corrected,
+            "wall_s_per_sim_s": self.wall_s_per_sim_s,
+            "wall_s": self.wall_s,
+            "fallbacks": self.fallbacks,
+        }
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A setting that was not scored, and why: unstable, or too long for the grid's budget."""
+
+    case: str
+    setting: Setting
+    why: str
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Converged motion: probe values (k, q), and how far two resolutions of it still differ."""
+
+    values: Array
+    uncertainty: float
+
+
+def run_static(case: Case, models: tuple[str, ...], grid: Grid) -> list[Outcome]:
+    """Runs a static case with every setting of the grid."""
+    assert case.truth is not None
+    truth = case.truth()
+    outcomes = []
+    for setting in list_static(case, models, grid):
+        hose = setting.make(case)
+        case.lay(hose)
+        start = time.perf_counter()
+        values = case.probe(hose)
+        wall = time.perf_counter() - start
+        points = hose.position(_drawn(case))[None]
+        error = float(np.max(np.abs(values - truth) / (case.scale or np.abs(truth))))
+        outcomes.append(
+            Outcome(
+                case.id,
+                setting,
+                error,
+                "closed form",
+                wall,
+                None,
+                _count_fallbacks(hose),
+                np.zeros(1),
+                points,
+                values[None],
+            )
+        )
+    return outcomes
+
+
+def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
+    """Lays a hose and lets it move; returns times (k,), probe (k, q), points (k, m, 3), wall time (s).
+
+    Raises:
+        StepError: a step that fails.
+    """
+    assert case.motion is not None
+    motion = case.motion
+    holds = case.lay(hose)
+    drawn = _drawn(case)
+    pause = motion.duration / motion.n_samples
+    n_steps = round(pause / hose.timestep)
+    times, values, points = [0.0], [case.probe(hose)], [hose.position(drawn)]
+    wall = 0.0
+    for sample in range(1, motion.n_samples + 1):
+        start = time.perf_counter()
+        if motion.drive is None:
+            hose.step(n_steps)
+        else:
+            begun = (sample - 1) * n_steps
+            for step in range(begun + 1, begun + n_steps + 1):
+                motion.drive(hose, holds, step * hose.timestep)
+                hose.step(1)
+        wall += time.perf_counter() - start
+        times.append(sample * pause)
+        values.append(case.probe(hose))
+        points.append(hose.position(drawn))
+    return np.array(times), np.array(values), np.array(points), wall
+
+
+def compute_reference(case: Case, *, stretchable: bool, control_points: int = 48) -> Reference:
+    """The converged limit of a motion: GEDS, fine in n, extrapolated in the time step.
+
+    Args:
+        case: a dynamic case.
+        stretchable: False for the limit of inextensible models (EA times STIFFENING).
+        control_points: of the finer of the two resolutions compared.
+    """
+    assert case.motion is not None
+    spec = case.spec
+    if not stretchable:
+        spec = replace(spec, axial_stiffness=STIFFENING * spec.axial_stiffness)
+    case = replace(case, spec=spec)
+    pause = case.motion.duration / case.motion.n_samples
+
+    def extrapolate(n: int, parts: int) -> Array:
+        runs = []
+        for k in (parts, 2 * parts):
+            setting = Setting("geds", "bdf2, planar", n, None, pause / k)
+            runs.append(simulate(case, setting.make(case, tolerance=1e-7))[1])
+        return np.asarray((4.0 * runs[1] - runs[0]) / 3.0)
+
+    fine = extrapolate(control_points, 256)
+    coarse = extrapolate(3 * control_points // 4, 128)
+    assert case.scale is not None
+    return Reference(fine, _distance(fine, coarse) / case.scale)
+
+
+def run_ladder(
+    case: Case, ladder: list[Setting], reference: Reference, grid: Grid
+) -> tuple[list[Outcome], list[Skipped]]:
+    """Runs one model and resolution down its time steps, from the largest stable one on."""
+    outcomes: list[Outcome] = []
+    skipped: list[Skipped] = []
+    for setting in ladder:
+        if setting.model != "geds" and _is_exhausted(outcomes):
+            break
+        why = _foresee(case, setting, grid) if setting.model != "geds" else None
+        outcome = None
+        if why is None:
+            outcome = _score(case, setting, reference)
+            why = "unstable" if outcome is None else None
+        if why is not None:
+            skipped.append(Skipped(case.id, setting, why))
+            if why != "unstable":
+                break
+        if outcome is not None:
+            outcomes.append(outcome)
+    return outcomes, skipped
+
+
+def _is_exhausted(outcomes: list[Outcome]) -> bool:
+    """True once the last halving of the time step took less than STAGNATION off the error."""
+    return len(outcomes) >= 2 and outcomes[-1].error > (1.0 - STAGNATION) * outcomes[-2].error
+
+
+def _score(case: Case, setting: Setting, reference: Reference) -> Outcome | None:
+    """One run against the reference; None where it was unstable."""
+    assert case.motion is not None and case.scale is not None
+    hose = setting.make(case)
+    try:
+        times, values, points, wall = simulate(case, hose)
+    except StepError:
+        return None
+    error = _distance(values, reference.values) / case.scale
+    if not error < LOST and setting.model != "geds":
+        return None
+    return Outcome(
+        case.id,
+        setting,
+        error,
+        "converged",
+        wall,
+        case.motion.duration,
+        _count_fallbacks(hose),
+        times,
+        points,
+        values,
+    )
+
+
+def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:
+    """A reason to leave a run out, from the pace of its first hundredth; None to run it."""
+    assert case.motion is not None
+    hose = setting.make(case)
+    case.lay(hose)
+    n_steps = max(1, round(0.01 * case.motion.duration / hose.timestep))
+    start = time.perf_counter()
+    try:
+        hose.step(n_steps)
+    except StepError:
+        return "unstable"
+    whole = (time.perf_counter() - start) * case.motion.duration / (n_steps * hose.timestep)
+    return f"would take {whole:.0f} s" if whole > grid.longest_run else None
+
+
+def time_rounds(case: Case, outcomes: Iterable[Outcome], grid: Grid) -> None:
+    """Runs the short ones again, all models in turn, and keeps the least wall time of each."""
+    for _ in range(grid.rounds - 1):
+        for outcome in outcomes:
+            if outcome.wall_s < 0.25 * grid.longest_run / grid.rounds / 10.0:
+                wall = simulate(case, outcome.setting.make(case))[3]
+                outcome.wall_s = min(outcome.wall_s, wall)
+
+
+def _drawn(case: Case) -> Array:
+    return np.linspace(0.0, case.spec.length, N_DRAWN)
+
+
+def _count_fallbacks(hose: HoseModel) -> int:
+    return int(getattr(hose, "fallbacks", 0))
+
+
+def _distance(values: Array, reference: Array) -> float:
+    """Largest distance between two motions' points, (k, 3 p) each (m)."""
+    gap = (values - reference).reshape(len(values), -1, 3)
+    return float(np.max(np.linalg.norm(gap, axis=2)))
+
+
+__all__ = [
+    "Outcome",
+    "Reference",
+    "Skipped",
+    "compute_reference",
+    "list_ladders",
+    "run_ladder",
+    "run_static",
+    "simulate",
+    "time_rounds",
+]

@@ -1,0 +1,69 @@
+"""What a user gets who installs the wheel instead of working in a checkout."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+pytest.importorskip("hatchling", reason="builds with hatchling (extra dev)")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel of this tree, built without the network."""
+    folder = tmp_path_factory.mktemp("dist")
+    words = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", folder]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (file,) = folder.glob("*.whl")
+    return file
+
+
+def test_contents(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (entry_points,) = (archive.read(n) for n in names if n.endswith("/entry_points.txt"))
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {
+        *("hose_mj", "learning", "tools"),
+    }
+    assert {"hose_mj/py.typed", "hose_mj/errors.py", "learning/__init__.py"} <= names
+    assert b"hose-mj = tools.cli:main" in entry_points
+    assert not [name for name in names if "__pycache__" in name or name.endswith(".rrd")]
+
+
+def test_every_asset_is_inside(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    listed = subprocess.run(
+        ["git", "ls-files", "assets"], cwd=ROOT, capture_output=True, text=True
+    ).stdout.split()
+    assert {f"hose_mj/{name}" for name in listed} <= names
+
+
+def test_the_doctor_runs_from_the_wheel(wheel, tmp_path):
+    zipfile.ZipFile(wheel).extractall(tmp_path)
+    code = (
+        "import sys, hose_mj; from tools.cli import main; print(hose_mj.__file__, file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; sys.exit(main(['doctor', '--json']))"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert Path(done.stderr).is_relative_to(tmp_path)
+    shown = json.loads(done.stdout)
+    assert shown["revision"] is None
+    assert {"mujoco", "numba"} <= {check["name"] for check in shown["checks"]}

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-import operator
 import os
 import platform
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any, Protocol, TextIO
@@ -23,13 +22,6 @@ import hose_mj
 from hose_mj.errors import InputError
 
 _SHARED_ARGUMENTS = {"json", "seed"}
-_COMPARISONS = {
-    "<=": operator.le,
-    "<": operator.lt,
-    ">=": operator.ge,
-    ">": operator.gt,
-    "==": operator.eq,
-}
 
 
 class CheckRecord(Protocol):
@@ -38,49 +30,6 @@ class CheckRecord(Protocol):
     def as_record(self) -> dict[str, Any]:
         """Returns at least `name`, `value`, `limit` and `ok`."""
         ...
-
-
-@dataclass(frozen=True)
-class Check:
-    """A measured number against its limit.
-
-    Attributes:
-        name: what was measured.
-        value: the number measured; one that is not finite never passes.
-        limit: the bound it is held against.
-        comparison: how value and limit must stand: ``<=``, ``<``, ``>=``, ``>`` or ``==``.
-
-    Raises:
-        InputError: an unknown comparison or a limit that is not finite.
-    """
-
-    name: str
-    value: float
-    limit: float
-    comparison: str = "<="
-
-    def __post_init__(self) -> None:
-        if self.comparison not in _COMPARISONS:
-            raise InputError("comparison", self.comparison, " ".join(_COMPARISONS))
-        if not math.isfinite(self.limit):
-            raise InputError(f"limit of {self.name}", self.limit, "a finite number")
-
-    @property
-    def ok(self) -> bool:
-        """Whether the value keeps to the limit."""
-        compare = _COMPARISONS[self.comparison]
-        return math.isfinite(self.value) and bool(compare(self.value, self.limit))
-
-    def as_record(self) -> dict[str, Any]:
-        """Returns the check as it stands in a document; a value that is not finite becomes null."""
-        value = float(self.value) if math.isfinite(self.value) else None
-        return {
-            "name": self.name,
-            "value": value,
-            "limit": float(self.limit),
-            "comparison": self.comparison,
-            "ok": self.ok,
-        }
 
 
 def make_document(

@@ -20,6 +20,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.page_style import CSS
@@ -31,16 +32,6 @@ _NUMBER = re.compile(
     re.IGNORECASE,
 )
 _BLANKS = {"", "-", _DASH}
-
-
-@dataclass(frozen=True)
-class Check:
-    """One thing that was checked: its value, what it must satisfy ("<= 0.01"), whether it does."""
-
-    name: str
-    value: object
-    limit: object
-    ok: bool
 
 
 @dataclass(frozen=True)
@@ -262,7 +253,7 @@ def is_numeric(cells: Sequence[str]) -> bool:
 def format_check(check: Check) -> str:
     """Returns one line of a check list."""
     badge, word = ("ok", "ok") if check.ok else ("failed", "failed")
-    detail = " ".join(filter(None, [format_value(check.value), _limit(check.limit)]))
+    detail = f"{format_value(check.value)} (limit {check.comparison} {format_value(check.limit)})"
     return (
         f'<li><span class="badge {badge}">{word}</span><span>{format_text(check.name)}</span>'
         f'<span class="detail">{format_text(detail)}</span></li>\n'
@@ -280,11 +271,6 @@ def format_picture(picture: Picture) -> str:
         f'<figure><div class="card"><img alt="{escape(picture.alt)}" width="{width}" '
         f'height="{height}" src="data:image/png;base64,{data}"/></div>{caption}</figure>'
     )
-
-
-def _limit(limit: object) -> str:
-    text = format_value(limit)
-    return f"(limit {text})" if text else ""
 
 
 def _cell(tag: str, text: str, right: bool) -> str:

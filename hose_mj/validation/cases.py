@@ -93,7 +93,7 @@ class Case:
     motion: Motion | None = None
     clamped: bool = False
     models: tuple[str, ...] = ("geds", "cable", "hinge-chain")
-    steps: tuple[float, ...] = (0.01, 0.005, 0.0025, 0.00125, 0.000625)
+    steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
 
 
 def _straight(hose: HoseModel) -> None:

@@ -181,8 +181,12 @@ def run_ladder(
     outcomes: list[Outcome] = []
     skipped: list[Skipped] = []
     for setting in ladder:
-        if setting.model != "geds" and _is_exhausted(outcomes):
-            break
+        if setting.model != "geds" and outcomes:
+            if _is_exhausted(outcomes):
+                break
+            assert setting.timestep is not None and outcomes[-1].setting.timestep is not None
+            if setting.timestep > 0.51 * outcomes[-1].setting.timestep:
+                continue
         why = _foresee(case, setting, grid) if setting.model != "geds" else None
         outcome = None
         if why is None:

@@ -10,10 +10,13 @@ from hose_mj.hoses.model import HoseModel
 from hose_mj.hoses.registry import make_hose
 from hose_mj.validation.cases import Case
 
-LARGEST_STEP = 0.01
+STEP_UNIT = 0.02
+"""Time steps are this over a whole number, so that they divide the pauses between samples (s)."""
+LARGEST_STEP = STEP_UNIT / 2
 SMALLEST_STEP = 1e-6
 STAGNATION = 0.15
-"""A chain's time step is halved, from the largest stable one on, until that takes less off its error."""
+"""A chain's time step is halved, from the largest stable one on, until a halving takes less than
+this fraction off its error."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ FULL = Grid(
         "hinge-chain": (10, 20, 40, 80),
     },
     dynamic={
-        "geds": (8, 10, 12, 16, 20, 24, 32),
+        "geds": (8, 9, 10, 11, 12, 13, 14, 16, 20, 24, 32),
         "cable": (10, 15, 20, 30, 40, 60, 80, 120, 160),
         "hinge-chain": (10, 15, 20, 30, 40, 60, 80, 120, 160),
     },
@@ -107,7 +110,7 @@ FULL = Grid(
 )
 QUICK = Grid(
     static={"geds": (8, 12, 20), "cable": (20, 40), "hinge-chain": (20, 40)},
-    dynamic={"geds": (8, 12, 16, 24), "cable": (20, 40), "hinge-chain": (20, 40)},
+    dynamic={"geds": (8, 10, 12, 13, 16, 24), "cable": (20, 40), "hinge-chain": (20, 40)},
     schemes=_SCHEMES,
     longest_run=4.0,
     rounds=3,
@@ -140,9 +143,10 @@ def _clamps(model: str, case: Case) -> tuple[bool | None, ...]:
 
 
 def _steps(model: str, case: Case) -> list[float]:
+    """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them."""
     if model == "geds":
         return list(case.steps)
-    steps = [LARGEST_STEP]
-    while steps[-1] > 2.0 * SMALLEST_STEP:
-        steps.append(0.5 * steps[-1])
-    return steps
+    parts = [2, 3, 4, 5, 6]
+    while STEP_UNIT / parts[-1] > SMALLEST_STEP:
+        parts.append(2 * parts[-3])
+    return [STEP_UNIT / part for part in parts]

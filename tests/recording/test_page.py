@@ -3,8 +3,9 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
+from hose_mj.checks import Check
 from hose_mj.errors import InputError
-from hose_mj.recording.page import Check, Page, Picture
+from hose_mj.recording.page import Page, Picture
 from hose_mj.recording.plots import plot_series
 
 NASTY = "<script>alert('&\"')</script>"
@@ -24,7 +25,7 @@ def document(png):
     section.table([NASTY, "error"], [[NASTY, 1.5e-3], ["b", None]], NASTY)
     section.figure(png, NASTY, NASTY)
     section.figures([Picture(png, NASTY), Picture(png, NASTY, NASTY)])
-    section.checks([Check(NASTY, 0.1, NASTY, True), Check("two", 1, 2, False)])
+    section.checks([Check(NASTY, 0.1, 1.0), Check("two", 3.0, 2.0)])
     section.equation(NASTY, "1")
     section.code(NASTY)
     section.link(NASTY, "compare.rrd?" + NASTY)

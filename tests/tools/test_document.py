@@ -15,9 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hose_mj
+from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from tools import document
-from tools.document import Check, format_document, make_document
+from tools.document import format_document, make_document
 
 
 @dataclass(frozen=True)

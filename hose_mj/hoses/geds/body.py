@@ -59,6 +59,11 @@ class SplineBody:
         """Control points (n, 3) in the world frame (m), a copy."""
         return self._spline.to_world(self._state.x) + self._spline.offset
 
+    @property
+    def control_velocities(self) -> Array:
+        """Velocities of the control points (n, 3) in the world frame (m/s), a copy."""
+        return self._spline.to_world(self._state.v)
+
     def position(self, arc_length: ArrayLike) -> Array:
         """Centre line, shape (k, 3), m, world frame (thesis A.2)."""
         return self._evaluate(arc_length, self._state.x) + self._spline.offset
@@ -90,8 +95,8 @@ class SplineBody:
         """Energies at the present state (thesis A.10, A.15)."""
         stretching, bending = self._run_on_strains(energy.compute_energy)
         kinetic = 0.5 * float(self._state.v @ self._multiply_mass(self._state.v))
+        # The offset of a planar hose is normal to gravity.
         gravitational = -float(self._state.x @ self._weight)
-        gravitational -= self.spec.mass * float(self._spline.offset @ self.gravity)
         return Energies(kinetic, float(stretching), float(bending), 0.0, gravitational)
 
     def momentum(self) -> Momentum:
@@ -118,22 +123,42 @@ class SplineBody:
             state.v[:] = self._spline.interpolate(arc_lengths, speeds)
         self._state, self._spline.offset = state, offset
 
-    def _sample_velocity(self, velocity: Curve, arc_lengths: Array) -> Array:
-        values = velocity(arc_lengths) if callable(velocity) else velocity
-        n = len(arc_lengths)
-        valid = f"finite numbers (m/s), shape (3,) or ({n}, 3)"
+    def _put(self, points: ArrayLike) -> None:
+        """Makes the state anew from control points (n, 3), at rest."""
+        shape = (self._spline.n_control_points, 3)
         try:
-            speeds = np.asarray(values, dtype=np.float64)
+            wanted = np.asarray(points, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError("control points", points, f"finite numbers, shape {shape}") from None
+        if wanted.shape != shape or not np.all(np.isfinite(wanted)):
+            valid = f"shape {shape}, all finite"
+            raise InputError("shape of the control points", wanted.shape, valid)
+        self._spline.offset = self._spline.find_offset(wanted)
+        self._state = schemes.make_state(self._spline.size)
+        self._state.x[:] = wanted[:, self._spline.dims].ravel()
+
+    def _sample_velocity(self, velocity: Curve, arc_lengths: Array) -> Array:
+        """Velocities (n, 3) at n arc lengths; rows of an array are spread evenly over the hose."""
+        valid = "finite numbers (m/s), shape (3,), or (k, 3) with k >= 2"
+        values = velocity(arc_lengths) if callable(velocity) else velocity
+        try:
+            rows = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError("velocity", values, valid) from None
-        if speeds.shape not in ((3,), (n, 3)):
-            raise InputError("shape of velocity", speeds.shape, valid)
-        if not np.all(np.isfinite(speeds)):
-            raise InputError("velocity", values, valid)
-        if self._spline.dimension == 2:
-            for speed in np.atleast_2d(speeds):
-                self._spline.check_in_plane("velocity", speed, 1e-9)
-        return np.broadcast_to(speeds, (n, 3))
+        if callable(velocity) and rows.shape != (len(arc_lengths), 3):
+            valid = f"shape ({len(arc_lengths)}, 3)"
+            raise InputError("velocity(arc_lengths)", rows.shape, valid)
+        if rows.shape == (3,):
+            rows = np.stack([rows, rows])
+        if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 2:
+            raise InputError("shape of velocity", rows.shape, valid)
+        if not np.all(np.isfinite(rows)):
+            bad = int(np.argmin(np.all(np.isfinite(rows), axis=1)))
+            raise InputError(f"velocity[{bad}]", rows[bad].tolist(), "finite numbers (m/s)")
+        for row in rows:
+            self._spline.check_in_plane("velocity", row, 1e-9)
+        even = np.linspace(0.0, self.spec.length, len(rows))
+        return np.stack([np.interp(arc_lengths, even, rows[:, c]) for c in range(3)], axis=1)
 
     def _evaluate(self, arc_length: ArrayLike, flat: Array, derivative: int = 0) -> Array:
         s = check_arc_lengths(arc_length, self.spec.length)

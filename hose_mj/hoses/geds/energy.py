@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.model import Array
 
 SMALLEST_A = 0.01
@@ -69,7 +69,8 @@ class Span(NamedTuple):
     block: Array
 
 
-def make_span() -> Span:
+@compiled
+def make_span():  # type: ignore[no-untyped-def]
     """Returns work arrays for one thread."""
     return Span(
         np.zeros((3, 3)),
@@ -191,7 +192,8 @@ def compute_energy(axes, tables, elasticity, x, p, strains):  # type: ignore[no-
 def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped-def]
     """Sets force and stiffness of Gauss point g to `weight` (EI times length) times the bending terms.
 
-    `exact` scales the Hessian of |kb|^2 / 2, `viscous` its Gauss-Newton part J^T J, J = d kb.
+    `exact` scales the Hessian of |kb|^2 / 2, `viscous` its Gauss-Newton part J^T J with
+    J = (1 - t t^T) d kb, the change of kb that a turn of the tangent alone does not explain.
     """
     a = p.a
     b = p.b
@@ -207,14 +209,16 @@ def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped
     for c in range(len(axes)):
         p.force[g, 0, c] = weight * (P * (B * a[g, c] - C * b[g, c]) + D * P1 * a[g, c])
         p.force[g, 1, c] = weight * P * (A * b[g, c] - C * a[g, c])
-    # Coefficients of I, a a^T, a b^T, b a^T in the blocks (a, a) and (a, b); what is left is shared.
+    # Coefficients of I, a a^T, a b^T, b a^T, b b^T in the blocks (a, a) and (a, b).
     s = 0.5 * P1 / P
     both = weight * (exact + viscous) * P
     exact *= weight
     viscous *= weight * P
-    aa_1 = both * B + exact * D * P1
-    aa_aa = exact * (4.0 * B * P1 + 2.0 * D * P2) + viscous * (4.0 * s * B + 4.0 * s * s * D)
-    aa_ab = -2.0 * C * (exact * P1 + viscous * s)
+    aa_1 = exact * (B * P + D * P1) + viscous * (B + s * D)
+    aa_aa = exact * (4.0 * B * P1 + 2.0 * D * P2) + viscous * (3.0 * s * B + 4.0 * s * s * D)
+    aa_ab = -C * (2.0 * exact * P1 + viscous * s)
+    aa_bb = -exact * P - viscous * (1.0 + s * A)
+    ab_aa = -2.0 * C * (exact * P1 + viscous * s)
     ab_ab = 2.0 * exact * (P + A * P1) + viscous * (1.0 + 2.0 * s * A)
     ab_ba = -exact * P
     for c1 in range(len(axes)):
@@ -225,9 +229,9 @@ def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped
             ba = b[g, c1] * a[g, c2]
             bb = b[g, c1] * b[g, c2]
             entry = p.stiffness
-            entry[c1, c2, g] = aa_1 * unit + aa_aa * aa + aa_ab * (ab + ba) - both * bb
-            entry[c1, c2, 3 + g] = -both * C * unit + aa_ab * aa + ab_ab * ab + ab_ba * ba
-            entry[c1, c2, 6 + g] = -both * C * unit + aa_ab * aa + ab_ab * ba + ab_ba * ab
+            entry[c1, c2, g] = aa_1 * unit + aa_aa * aa + aa_ab * (ab + ba) + aa_bb * bb
+            entry[c1, c2, 3 + g] = -both * C * unit + ab_aa * aa + ab_ab * ab + ab_ba * ba
+            entry[c1, c2, 6 + g] = -both * C * unit + ab_aa * aa + ab_ab * ba + ab_ba * ab
             entry[c1, c2, 9 + g] = both * (A * unit - aa)
 
 
@@ -257,14 +261,20 @@ def _add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
     D = max(A * B - C * C, 0.0)
     s = 0.5 * P1 / P
     weight *= P
-    aa_aa = 4.0 * s * B + 4.0 * s * s * D
-    aa_ab = -2.0 * s * C
+    aa_1 = B + s * D
+    aa_aa = 3.0 * s * B + 4.0 * s * s * D
+    aa_ab = -s * C
+    aa_bb = -1.0 - s * A
+    ab_aa = -2.0 * s * C
     ab_ab = 1.0 + 2.0 * s * A
-    on_a = aa_aa * a_u + aa_ab * (b_u + a_v) + ab_ab * b_v
+    on_a = aa_aa * a_u + aa_ab * b_u + ab_aa * a_v + ab_ab * b_v
+    on_b = aa_ab * a_u + aa_bb * b_u
     for c in range(len(axes)):
-        p.force[g, 0, c] += weight * (B * u[g, c] - C * v[g, c] + on_a * a[g, c] + (aa_ab * a_u - b_u) * b[g, c])
+        p.force[g, 0, c] += weight * (
+            aa_1 * u[g, c] - C * v[g, c] + on_a * a[g, c] + on_b * b[g, c]
+        )
         p.force[g, 1, c] += weight * (
-            A * v[g, c] - C * u[g, c] + (aa_ab * a_u - a_v) * a[g, c] + ab_ab * a_u * b[g, c]
+            A * v[g, c] - C * u[g, c] + (ab_aa * a_u - a_v) * a[g, c] + ab_ab * a_u * b[g, c]
         )
 
 

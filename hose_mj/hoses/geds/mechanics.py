@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds import basis, energy, solver
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import basis, energy, schemes, solver
 from hose_mj.hoses.geds.compiled import compile_notice
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
 
 MOST_LOAD_STEPS = 64
@@ -18,23 +19,25 @@ _STATIC_ITERATIONS = 400
 _STATIC_TURN = 0.5
 """Largest turn of a tangent in one static iteration (rad): beats an energy line search near
 inextensibility."""
-_called: set[tuple[str, int]] = set()
 
 
 def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
     """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
-    key = kernel.__name__, len(axes)
-    if key in _called:
+    with compile_notice("GEDS kernels", (kernel.__name__, len(axes))):
         return kernel(axes, *arguments)
-    with compile_notice("GEDS kernels"):
-        answer = kernel(axes, *arguments)
-    _called.add(key)
-    return answer
+
+
+def check_scheme(scheme: str, spec: HoseSpec) -> None:
+    """Raises `InputError` for an unknown scheme, or one that cannot do what the hose needs."""
+    if scheme not in schemes.SCHEMES:
+        raise InputError("scheme", scheme, "one of " + ", ".join(schemes.SCHEMES))
+    if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0):
+        raise InputError("scheme", scheme, "an implicit scheme for a hose with damping or drag")
 
 
 def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
     """Returns what the kernels need to know of a uniform hose with these knots (n + 4,)."""
-    with compile_notice("GEDS kernels"):
+    with compile_notice("GEDS kernels", "basis"):
         tables = basis.make_tables(knots)
     n_spans = len(tables.first)
     elasticity = energy.Elasticity(
@@ -142,6 +145,22 @@ def make_dense_rows(holds: solver.Holds, size: int) -> Array:
     for row, start in enumerate(holds.start):
         dense[row, start : start + width] = holds.rows[row]
     return dense
+
+
+def compute_linearization(
+    axes: tuple[float, ...],
+    hose: solver.Hose,
+    holds: solver.Holds,
+    work: solver.Work,
+    size: int,
+) -> Linearization:
+    """Returns dense mass, stiffness (from `build_tangent`) and hold rows; overwrites work.band."""
+    width = 4 * len(axes)
+    stiffness = make_dense(work.band, size, width)
+    work.band[:] = 0.0
+    run_kernel(solver.add_mass, axes, hose.mass, 1.0, work.band)
+    mass = make_dense(work.band, size, width)
+    return Linearization(mass, stiffness, make_dense_rows(holds, size))
 
 
 def interpolate_tension(strains: Array, axial_stiffness: float, length: float, s: Array) -> Array:

@@ -16,7 +16,7 @@ from hose_mj.hoses.geds import mechanics, schemes, solver
 from hose_mj.hoses.geds.body import SplineBody
 from hose_mj.hoses.geds.holds import HoldSet
 from hose_mj.hoses.geds.loads import LoadSet
-from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.spline import Spline, check_count
 from hose_mj.hoses.model import Array, Curve, Hold, Linearization, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
 
@@ -60,12 +60,11 @@ class GedsHose(SplineBody):
     ) -> None:
         check_number("timestep", timestep)
         check_number("tolerance", tolerance)
-        _check_count("max_iterations", max_iterations, 1)
-        _check_scheme(scheme, spec)
+        check_count("max_iterations", max_iterations, 1)
+        mechanics.check_scheme(scheme, spec)
         super().__init__(spec, Spline(control_points, spec.length, plane), gravity)
         self.scheme = scheme
-        self.fallbacks = 0
-        self.iterations = 0
+        self.fallbacks = self.iterations = self._steps = 0
         self._timestep = float(timestep)
         self._limits = solver.Limits(tolerance * spec.length, max_iterations, np.inf, False, 0.0)
         self._holds = HoldSet(self._spline)
@@ -89,17 +88,27 @@ class GedsHose(SplineBody):
 
         Args:
             curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.
-            velocity: (3,) or (n, 3) m/s at n evenly spaced arc lengths, or a function likewise.
+            velocity: m/s, world frame: (3,), or rows (k, 3) spread evenly over the arc length, or a
+                function of arc lengths (k,) that returns (k, 3); None for rest.
 
         Raises:
             InputError: a curve or a velocity that is not finite, has a wrong shape or leaves the
                 plane of a planar hose; a curve far from the hose's length. Nothing changed then.
         """
         self._lay(curve, velocity)
-        self._steps = 0
-        self._loads.clear()
-        self._holds.clear(self._state.x)
-        self._renew_work()
+        self._start()
+
+    def set_control_points(self, points: ArrayLike) -> None:
+        """Puts the control points at (n, 3) m, at rest, however odd; drops holds and loads.
+
+        Meant for tests of odd states; `reset` is for use. A planar hose takes its plane from the
+        first point.
+
+        Raises:
+            InputError: a wrong shape, a number that is not finite, points out of the plane.
+        """
+        self._put(points)
+        self._start()
 
     def snapshot(self) -> dict[str, Any]:
         """All that `restore` needs to continue bit by bit: arrays, numbers, containers of them."""
@@ -200,18 +209,17 @@ class GedsHose(SplineBody):
             InputError: n_steps is not a whole number at or above 0.
             StepError: a step that no fallback finished; the last step that worked is kept.
         """
-        _check_count("n_steps", n_steps, 0)
-        if n_steps == 0:
+        if check_count("n_steps", n_steps, 0) == 0:
             return
-        count = schemes.Count(*(np.zeros(1, dtype=np.int64) for _ in range(3)))
-        scheme = schemes.SCHEMES[self.scheme]
+        counts = np.zeros(3, dtype=np.int64)
         verdict = mechanics.run_kernel(
             *(schemes.advance, self._axes, self._hose, self._holds.rows, self._loads.loads),
-            *(self._limits, scheme, self._timestep, int(n_steps), self._state, self._work, count),
+            *(self._limits, schemes.SCHEMES[self.scheme], self._timestep, int(n_steps)),
+            *(self._state, counts),
         )
-        self._steps += int(count.steps[0])
-        self.iterations += int(count.iterations[0])
-        self.fallbacks += int(count.fallbacks[0])
+        self._steps += int(counts[schemes.STEPS])
+        self.iterations += int(counts[schemes.ITERATIONS])
+        self.fallbacks += int(counts[schemes.FALLBACKS])
         if verdict != solver.DONE:
             raise StepError(
                 f"the step at t = {self.time:.6g} s failed: {solver.VERDICTS[verdict]}; "
@@ -227,7 +235,7 @@ class GedsHose(SplineBody):
             InputError: load_steps is not a whole number from 1 to 64.
             StepError: no equilibrium was found; the state before is kept.
         """
-        _check_count("load_steps", load_steps, 1, mechanics.MOST_LOAD_STEPS)
+        check_count("load_steps", load_steps, 1, mechanics.MOST_LOAD_STEPS)
         found = mechanics.find_equilibrium(
             *(self._axes, self._hose, self._holds.rows, self._loads.loads),
             *(self._state.x, self._work, int(load_steps)),
@@ -243,13 +251,9 @@ class GedsHose(SplineBody):
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and hold rows in the control points' n d coordinates."""
-        size, width = self._spline.size, 4 * self._spline.dimension
         self._build_tangent()
-        stiffness = mechanics.make_dense(self._work.band, size, width)
-        self._work.band[:] = 0.0
-        mechanics.run_kernel(solver.add_mass, self._axes, self._hose.mass, 1.0, self._work.band)
-        mass = mechanics.make_dense(self._work.band, size, width)
-        return Linearization(mass, stiffness, mechanics.make_dense_rows(self._holds.rows, size))
+        rows, size = self._holds.rows, self._spline.size
+        return mechanics.compute_linearization(self._axes, self._hose, rows, self._work, size)
 
     def compute_required_forces(self, acceleration: ArrayLike) -> Array:
         """Forces on the control points for wanted accelerations of theirs (inverse dynamics).
@@ -277,6 +281,12 @@ class GedsHose(SplineBody):
 
     # -- inside ------------------------------------------------------------------------------------
 
+    def _start(self) -> None:
+        self._steps = 0
+        self._loads.clear()
+        self._holds.clear(self._state.x)
+        self._renew_work()
+
     def _renew_work(self) -> None:
         n_points, dimension = self._spline.n_control_points, self._spline.dimension
         self._work = solver.make_work(n_points, dimension, self._holds.n_rows)
@@ -286,17 +296,3 @@ class GedsHose(SplineBody):
             *(self._axes, self._hose, self._loads.loads),
             *(self._state.x, self._state.v, self._work),
         )
-
-
-def _check_count(name: str, value: object, least: int, most: int | None = None) -> None:
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
-        valid = f"a whole number at or above {least}" if most is None else f"{least} to {most}"
-        raise InputError(name, value, valid)
-
-
-def _check_scheme(scheme: str, spec: HoseSpec) -> None:
-    if scheme not in schemes.SCHEMES:
-        raise InputError("scheme", scheme, "one of " + ", ".join(schemes.SCHEMES))
-    if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0):
-        raise InputError("scheme", scheme, "an implicit scheme for a hose with damping or drag")

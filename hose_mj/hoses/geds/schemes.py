@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
-from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.solver import (
     DEPENDENT_HOLDS,
     DONE,
@@ -20,6 +20,7 @@ from hose_mj.hoses.geds.solver import (
     Limits,
     add_mass,
     build,
+    make_work,
     newton,
     solve_with_holds,
 )
@@ -48,12 +49,8 @@ class State(NamedTuple):
     started: Array
 
 
-class Count(NamedTuple):
-    """Counters, (1,) each: steps done, Newton iterations, fallbacks."""
-
-    steps: np.ndarray
-    iterations: np.ndarray
-    fallbacks: np.ndarray
+STEPS, ITERATIONS, FALLBACKS = range(3)
+"""Places in the counters, (3,): steps done, Newton iterations, solver fallbacks."""
 
 
 def make_state(size: int) -> State:
@@ -101,7 +98,7 @@ def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-de
 
 
 @kernel
-def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, count):  # type: ignore[no-untyped-def]
+def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, counts):  # type: ignore[no-untyped-def]
     """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
 
     Returns the verdict and the length of the last stage.
@@ -119,8 +116,8 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
             verdict, iterations, fallbacks = newton(
                 axes, hose, (h, work.X, work.V), holds, fraction, loads, 1.0, limits, work.x, work
             )
-            count.iterations[0] += iterations
-            count.fallbacks[0] += fallbacks
+            counts[ITERATIONS] += iterations
+            counts[FALLBACKS] += fallbacks
             if verdict != DONE:
                 return verdict, h
         for k in range(size):
@@ -135,7 +132,7 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
 
 
 @kernel
-def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, count):  # type: ignore[no-untyped-def]
+def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
     """One step; where the scheme's Newton fails, backward Euler with a line search in ever finer parts."""
     careful = Limits(limits.tolerance, 3 * limits.max_iterations, np.inf, True, 0.0)
     verdict = NOT_FINITE
@@ -147,7 +144,7 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
             use = scheme if first else _BACKWARD_EULER
         parts = 1 if attempt < 2 else 8 ** (attempt - 1)
         verdict, h = _try_step(
-            axes, hose, holds, loads, limits if first else careful, use, dt, parts, state, work, count
+            axes, hose, holds, loads, limits if first else careful, use, dt, parts, state, work, counts
         )
         if verdict == DEPENDENT_HOLDS:
             return verdict
@@ -160,7 +157,7 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
                 state.v[k] = work.v_now[k]
             state.started[0] = 1.0 if first else 0.0
             return verdict
-        count.fallbacks[0] += 1
+        counts[FALLBACKS] += 1
     return verdict
 
 
@@ -206,23 +203,25 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
     return DONE
 
 
-@kernel
-def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, work, count):  # type: ignore[no-untyped-def]
+@compiled
+def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts):  # type: ignore[no-untyped-def]
     """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
 
-    A step that fails leaves the state at the step before it; count.steps says how many were done.
-    Eleven arguments: it is the one entry to the dynamics.
+    A step that fails leaves the state at the step before it; `counts` says how many were done. Ten
+    arguments: it is the one entry to the dynamics. It makes its work arrays itself, which is
+    quicker than handing them over from Python.
     """
+    work = make_work(hose.mass.shape[0], len(axes), len(holds.start))
     for _ in range(n_steps):
         if scheme == _VERLET:
             verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
         else:
             verdict = _step_implicit(
-                axes, hose, holds, loads, limits, scheme, dt, state, work, count
+                axes, hose, holds, loads, limits, scheme, dt, state, work, counts
             )
         if verdict != DONE:
             return verdict
-        count.steps[0] += 1
+        counts[STEPS] += 1
         for row in range(len(holds.start)):
             holds.multipliers[row] = work.multipliers[row]
             holds.before[row] = holds.after[row]

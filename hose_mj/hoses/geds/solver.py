@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.band import factorize, make_band, solve_lower, solve_upper
+from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.basis import Tables
-from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
 from hose_mj.hoses.model import Array
 
@@ -119,19 +119,27 @@ class Work(NamedTuple):
     v_now: Array
 
 
-def make_work(n_control_points: int, dimension: int, n_rows: int) -> Work:
-    """Returns work arrays for n control points and m rows of holds."""
-    size = (n_control_points + 4) * dimension
+@compiled
+def make_work(n_control_points, dimension, n_rows):  # type: ignore[no-untyped-def]
+    """Returns work arrays for n control points of d unknowns each and m rows of holds."""
+    size = n_control_points * dimension
+    padded = size + 4 * dimension
     return Work(
         make_span(),
-        np.zeros(size),
-        np.zeros(size),
-        make_band(n_control_points, dimension),
-        np.zeros((n_rows, size)),
+        np.zeros(padded),
+        np.zeros(padded),
+        np.zeros((padded, 8 * dimension)),
+        np.zeros((n_rows, padded)),
         np.zeros((n_rows, n_rows)),
         np.zeros(n_rows),
+        np.zeros(padded),
         np.zeros(size),
-        *(np.zeros(n_control_points * dimension) for _ in range(7)),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
     )
 
 

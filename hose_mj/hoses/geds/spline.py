@@ -41,11 +41,9 @@ class Spline:
     """
 
     def __init__(self, n_control_points: int, length: float, plane: str | None) -> None:
-        n = n_control_points
-        whole = isinstance(n, int) and not isinstance(n, bool)
-        if not whole or not FEWEST_CONTROL_POINTS <= n <= MOST_CONTROL_POINTS:
-            valid = f"a whole number, {FEWEST_CONTROL_POINTS} to {MOST_CONTROL_POINTS}"
-            raise InputError("control_points", n, valid)
+        n = check_count(
+            "control_points", n_control_points, FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS
+        )
         if plane is not None and plane not in PLANES:
             raise InputError("plane", plane, f"None, {', '.join(PLANES)}")
         self.n_control_points = n
@@ -164,3 +162,13 @@ class Spline:
             raise InputError("tangent", vector.tolist(), "a vector that is not zero")
         self.check_in_plane("tangent", vector / length, 1e-9)
         return vector / length
+
+
+def check_count(name: str, value: object, least: int, most: int | None = None) -> int:
+    """Returns a whole number from `least` to `most`; raises `InputError` for anything else."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    count = int(value) if whole else least - 1  # type: ignore[call-overload]
+    if count < least or (most is not None and count > most):
+        end = f"at or above {least}" if most is None else f"from {least} to {most}"
+        raise InputError(name, value, f"a whole number {end}")
+    return count

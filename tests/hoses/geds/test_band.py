@@ -68,9 +68,7 @@ def make_holds(d, seed=0):
     rng = np.random.default_rng(seed)
     start = np.array([0, 0, 2 * d, 5 * d], dtype=np.int64)
     m = len(start)
-    return solver.Holds(
-        start, rng.normal(size=(m, 4 * d)), np.zeros(m), np.zeros(m), np.zeros(m)
-    )
+    return solver.Holds(start, rng.normal(size=(m, 4 * d)), np.zeros(m), np.zeros(m), np.zeros(m))
 
 
 @dimensions

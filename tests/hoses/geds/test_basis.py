@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -79,8 +81,7 @@ def test_mass_matrix_is_the_integral_of_products():
     for i, left in enumerate(splines):
         for j, right in enumerate(splines):
             parts = [
-                quad(lambda s, f=left, g=right: f(s) * g(s), a, b)[0]
-                for a, b in zip(pieces[:-1], pieces[1:], strict=True)
+                quad(lambda s, f=left, g=right: f(s) * g(s), a, b)[0] for a, b in pairwise(pieces)
             ]
             assert mass[i, j] == pytest.approx(density * sum(parts), rel=1e-10, abs=1e-16)
 

@@ -42,9 +42,7 @@ def test_order_in_the_time_step(make_hose, scheme):
 def test_linear_momentum_is_conserved(make_hose, plane, scheme, crude):
     rough = {"tolerance": 1e3, "max_iterations": 1} if crude else {}
     dt = 1e-4 if scheme == "verlet" else 5e-3
-    hose = make_hose(
-        plane=plane, scheme=scheme, timestep=dt, gravity=(0, 0, 0), ea=1e3, **rough
-    )
+    hose = make_hose(plane=plane, scheme=scheme, timestep=dt, gravity=(0, 0, 0), ea=1e3, **rough)
     hose.reset([[0, 0, 0], [1, 0, 0]], velocity=tumble)
     before = hose.momentum().linear
     hose.step(100)
@@ -136,9 +134,7 @@ def first_mode(s):
 def test_damping_time_decays_the_first_mode(make_hose, plane):
     tau = 0.03
     omega = FIRST_ROOT**2 * np.sqrt(EI / DENSITY)
-    hose = make_hose(
-        plane=plane, damping=tau, scheme="midpoint", timestep=0.005, gravity=(0, 0, 0)
-    )
+    hose = make_hose(plane=plane, damping=tau, scheme="midpoint", timestep=0.005, gravity=(0, 0, 0))
     hose.reset(lambda s: np.stack([s, 0 * s, 5e-5 * first_mode(s)], axis=1))
     hose.clamp(0.0)
     start = hose.energies().total

@@ -223,15 +223,37 @@ def test_the_number_of_steps_is_checked(make_hose, wave):
     assert hose.time == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("bad", [[1.0, 2.0], np.zeros((5, 3)), 1.0, [np.nan, 0, 0], "fast"])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        [1.0, 2.0],
+        np.zeros((1, 3)),
+        np.zeros((4, 2)),
+        1.0,
+        [np.nan, 0, 0],
+        "fast",
+        lambda s: s,
+        lambda s: np.zeros((3, 3)),
+    ],
+)
 def test_velocity_is_checked_before_anything_changes(make_hose, wave, bad):
     hose = make_hose(plane="xz")
     hose.reset(wave)
     hold, before = hose.attach(0.0), hose.control_points
-    with pytest.raises(InputError, match=r"velocity.* \(3,\) or \(16, 3\)"):
+    with pytest.raises(InputError, match=r"velocity.* valid: (finite|shape)"):
         hose.reset([[0, 0, 0], [1, 0, 0]], velocity=bad)
     np.testing.assert_array_equal(hose.control_points, before)
     hose.reaction(hold)
+
+
+def test_velocity_as_rows_or_as_a_function(make_hose):
+    hose = make_hose()
+    straight, s = [[0, 0, 0], [1, 0, 0]], [0.0, 0.25, 1.0]
+    rows = np.array([[0.0, 1.0, 2.0], [4.0, 1.0, -2.0]])
+    hose.reset(straight, velocity=rows)
+    np.testing.assert_allclose(hose.velocity(s), rows[:1] + np.outer(s, rows[1] - rows[0]))
+    hose.reset(straight, velocity=lambda s: np.outer(s**3, [0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(hose.velocity(s)[:, 1], np.array(s) ** 3, atol=1e-13)
 
 
 def test_a_planar_hose_stays_in_its_plane(make_hose):
@@ -252,3 +274,18 @@ def test_a_planar_hose_stays_in_its_plane(make_hose):
             call()
     hose.step(3)
     assert hose.position(0.3)[0, 1] == 2.0
+
+
+def test_control_points_in_and_out(make_hose):
+    hose = make_hose(plane="xz", control_points=6)
+    wanted = np.random.default_rng(0).normal(size=(6, 3)) * [1.0, 0.0, 1.0] + [0.0, 0.7, 0.0]
+    hose.attach(0.0)
+    hose.set_control_points(wanted)
+    np.testing.assert_array_equal(hose.control_points, wanted)
+    np.testing.assert_array_equal(hose.control_velocities, np.zeros((6, 3)))
+    np.testing.assert_allclose(hose.position([0.0, 1.0]), wanted[[0, -1]], atol=1e-14)
+    hose.attach(0.0)  # the hold from before is gone
+    for bad in (wanted[:5], wanted * np.nan, np.eye(6, 3), "points"):
+        with pytest.raises(InputError):
+            hose.set_control_points(bad)
+    np.testing.assert_array_equal(hose.control_points, wanted)

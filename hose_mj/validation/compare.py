@@ -1,0 +1,228 @@
+"""The comparison: cases by models by settings, then equal-error ratios and checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hose_mj.checks import Check
+from hose_mj.hoses.model import Array
+from hose_mj.validation.cases import Case
+from hose_mj.validation.run import (
+    Outcome,
+    Reference,
+    Skipped,
+    compute_reference,
+    run_ladder,
+    run_static,
+    time_rounds,
+)
+from hose_mj.validation.settings import Grid, list_ladders
+
+EQUAL_ERRORS = (0.01, 0.001)
+INEXTENSIBLE = ("cable", "hinge-chain")
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """At equal error, what one model costs over another: each at its cheapest setting of the grid.
+
+    Attributes:
+        case: its id.
+        at_error: both errors are at most this.
+        model, against: the two models; wall_ratio is the wall time of `against` over that of `model`.
+        model_setting, against_setting: labels of the settings.
+    """
+
+    case: str
+    at_error: float
+    model: str
+    against: str
+    wall_ratio: float
+    model_setting: str
+    against_setting: str
+
+
+@dataclass
+class CaseResult:
+    """All that was run in one case.
+
+    Attributes:
+        case: the case.
+        outcomes: scored runs.
+        skipped: settings left out, with reasons.
+        stretchable, inextensible: converged references; None in statics.
+        limit_gap: distance of MuJoCo's own Richardson limit from the inextensible reference, as a
+            fraction of L; None where the grid does not reach far enough to extrapolate.
+    """
+
+    case: Case
+    outcomes: list[Outcome] = field(default_factory=list)
+    skipped: list[Skipped] = field(default_factory=list)
+    stretchable: Reference | None = None
+    inextensible: Reference | None = None
+    limit_gap: float | None = None
+
+
+def run_case(
+    case: Case, models: tuple[str, ...], grid: Grid, advance: Callable[[str], None]
+) -> CaseResult:
+    """Runs one case on a grid; `advance` is told what comes next."""
+    models = tuple(model for model in models if model in case.models)
+    if case.motion is None:
+        advance("statics")
+        return CaseResult(case, run_static(case, models, grid))
+    advance("reference")
+    result = CaseResult(case)
+    result.stretchable = compute_reference(case, stretchable=True)
+    if set(models) & set(INEXTENSIBLE):
+        result.inextensible = compute_reference(case, stretchable=False)
+    for ladder in list_ladders(case, models, grid):
+        advance(f"{ladder[0].model}, {ladder[0].resolution}")
+        inextensible = ladder[0].model in INEXTENSIBLE
+        reference = result.inextensible if inextensible else result.stretchable
+        assert reference is not None
+        outcomes, skipped = run_ladder(case, ladder, reference, grid)
+        result.outcomes += outcomes
+        result.skipped += skipped
+    advance("timing")
+    time_rounds(case, result.outcomes, grid)
+    result.limit_gap = compute_limit_gap(result)
+    return result
+
+
+def compute_limit_gap(result: CaseResult) -> float | None:
+    """How far MuJoCo's own limit, extrapolated in segments, is from the inextensible reference.
+
+    The hinge chain at its finest time step of the two finest resolutions that differ by a factor of
+    two, with rk4 or euler; its error is of second order in the segment length.
+    """
+    assert result.inextensible is not None or not result.outcomes
+    finest: dict[int, Outcome] = {}
+    for outcome in result.outcomes:
+        setting = outcome.setting
+        if setting.model != "hinge-chain" or setting.scheme != "rk4":
+            continue
+        if setting.clamp_corrected is False:
+            continue
+        best = finest.get(setting.resolution)
+        assert setting.timestep is not None
+        if best is None or setting.timestep < (best.setting.timestep or 0.0):
+            finest[setting.resolution] = outcome
+    pairs = [(n, 2 * n) for n in finest if 2 * n in finest]
+    if not pairs or result.inextensible is None or result.case.scale is None:
+        return None
+    coarse, fine = max(pairs)
+    # With the clamp corrected h = L / (N - 1/2), else L / N.
+    shift = 0.5 if finest[fine].setting.clamp_corrected else 0.0
+    square = ((fine - shift) / (coarse - shift)) ** 2
+    limit: Array = (square * finest[fine].values - finest[coarse].values) / (square - 1.0)
+    gap = (limit - result.inextensible.values).reshape(len(limit), -1, 3)
+    return float(np.max(np.linalg.norm(gap, axis=2))) / result.case.scale
+
+
+def find_cheapest(
+    outcomes: list[Outcome], model: str, at_error: float, *, planar: bool = False
+) -> Outcome | None:
+    """The cheapest run of a model with at most this error; raw clamps never count."""
+    fits = [
+        outcome
+        for outcome in outcomes
+        if outcome.setting.model == model
+        and outcome.error <= at_error
+        and outcome.setting.clamp_corrected is not False
+        and (model != "geds" or outcome.setting.scheme.endswith("planar") == planar)
+    ]
+    return min(fits, key=lambda outcome: outcome.wall_s, default=None)
+
+
+def compute_ratios(result: CaseResult) -> list[Ratio]:
+    """Wall-time ratios at equal error, GEDS in space and in its plane against the others."""
+    ratios = []
+    for at_error in EQUAL_ERRORS:
+        for planar in (False, True):
+            ours = find_cheapest(result.outcomes, "geds", at_error, planar=planar)
+            for against in INEXTENSIBLE:
+                theirs = find_cheapest(result.outcomes, against, at_error)
+                if ours is None or theirs is None:
+                    continue
+                ratios.append(
+                    Ratio(
+                        result.case.id,
+                        at_error,
+                        "geds",
+                        against,
+                        theirs.wall_s / ours.wall_s,
+                        ours.setting.label,
+                        theirs.setting.label,
+                    )
+                )
+    return ratios
+
+
+def check_statics(results: list[CaseResult]) -> list[Check]:
+    """The largest static error of GEDS with 20 control points or fewer, family by family."""
+    least: dict[str, float] = {}
+    for result in results:
+        if result.case.motion is not None:
+            continue
+        ours = [o.error for o in result.outcomes if o.setting.model == "geds"]
+        if ours:
+            least[result.case.id] = min(ours)
+    checks = []
+    for case_id, error in least.items():
+        tight = case_id in ("heavy-cantilever-gamma-1", "heavy-cantilever-gamma-10")
+        name = f"{case_id}: error of GEDS with 20 control points or fewer"
+        checks.append(Check(name, error, 5e-4 if tight else 1e-3))
+    return checks
+
+
+def check_motions(result: CaseResult) -> list[Check]:
+    """Checks of one dynamic case: its references, and for the released rod errors and ratios."""
+    checks = []
+    case_id = result.case.id
+    for name, reference in (
+        ("stretchable", result.stretchable),
+        ("inextensible", result.inextensible),
+    ):
+        if reference is not None:
+            text = f"{case_id}: two resolutions of the {name} reference differ by (of L)"
+            checks.append(Check(text, reference.uncertainty, 1e-4))
+    if result.limit_gap is not None:
+        text = f"{case_id}: MuJoCo's Richardson limit differs from the reference by (of L)"
+        checks.append(Check(text, result.limit_gap, 1e-3))
+    if case_id == "released-rod":
+        checks += _check_released_rod(result)
+    return checks
+
+
+_PROMISED = {
+    ("cable", 0.01): 15.0,
+    ("cable", 0.001): 150.0,
+    ("hinge-chain", 0.01): 4.0,
+    ("hinge-chain", 0.001): 15.0,
+}
+"""How many times cheaper GEDS is to be at equal error on the released rod."""
+
+
+def _check_released_rod(result: CaseResult) -> list[Check]:
+    checks = []
+    for points, step, limit in ((8, 0.005, 0.01), (12, 0.0025, 0.0015)):
+        for outcome in result.outcomes:
+            setting = outcome.setting
+            place = (setting.model, setting.scheme, setting.resolution, setting.timestep)
+            if place == ("geds", "bdf2", points, step):
+                text = f"released-rod: tip error, {points} control points at {1e3 * step:g} ms (of L)"
+                checks.append(Check(text, outcome.error, limit))
+    for ratio in compute_ratios(result):
+        planar = "planar" in ratio.model_setting
+        # Like against like: the cable moves in space, the hinge chain in a plane.
+        if planar == (ratio.against == "hinge-chain"):
+            text = (
+                f"released-rod: {ratio.against} over GEDS, wall time at {100 * ratio.at_error:g} % error"
+            )
+            limit = _PROMISED[ratio.against, ratio.at_error]
+            checks.append(Check(text, ratio.wall_ratio, limit, ">="))
+    return checks

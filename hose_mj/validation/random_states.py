@@ -1,0 +1,112 @@
+"""Random states and loads, wilder than any use: what the solver does with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hose_mj.errors import StepError
+from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.model import Array
+from hose_mj.hoses.spec import HoseSpec
+
+N_STEPS = 3
+"""Steps taken from each state."""
+
+
+@dataclass
+class Tally:
+    """How many random states ended how.
+
+    Attributes:
+        not_finite: a position or velocity that is not finite.
+        verdicts: a StepError.
+        touched: a StepError after which the state was not the one before the failing step.
+        with_fallback: the solver needed a fallback.
+    """
+
+    not_finite: int = 0
+    verdicts: int = 0
+    touched: int = 0
+    with_fallback: int = 0
+
+
+def make_random_hose(rng: np.random.Generator) -> GedsHose:
+    """Returns a hose of random stiffness, shape, holds and loads.
+
+    Shapes: control points displaced by up to 2 L, four of them coincident, the polygon folded back
+    onto itself by 180 degrees, or a small disturbance. EA L^2 / EI from 1e2 to 1e8, time steps from
+    1e-4 to 2e-2 s, two forces of up to 100 weights.
+    """
+    stiffness = 0.05
+    n = int(rng.choice([6, 8, 12, 16, 24]))
+    plane = None if rng.random() < 0.5 else "xz"
+    spec = HoseSpec(
+        length=1.0,
+        axial_stiffness=float(10.0 ** rng.uniform(2.0, 8.0)) * stiffness,
+        bending_stiffness=stiffness,
+        linear_density=0.1,
+        damping_time=float(rng.choice([0.0, 0.0, 0.01])),
+    )
+    hose = GedsHose(
+        spec,
+        timestep=float(10.0 ** rng.uniform(-4.0, np.log10(0.02))),
+        control_points=n,
+        plane=plane,
+        scheme=str(rng.choice(["bdf2", "backward-euler"])),
+    )
+    hose.set_control_points(_draw_polygon(hose.control_points, plane, rng))
+    if rng.random() < 0.5:
+        hose.clamp(0.0, tangent=(1.0, 0.0, 0.0))
+    if rng.random() < 0.5:
+        hose.attach(float(rng.uniform(0.2, 1.0)))
+    for _ in range(2):
+        force = rng.normal(size=3)
+        force[1] *= plane is None
+        force *= rng.uniform(0.0, 100.0) * spec.mass * 9.81 / np.linalg.norm(force)
+        hose.apply_force(float(rng.uniform(0.0, 1.0)), force)
+    return hose
+
+
+def _draw_polygon(polygon: Array, plane: str | None, rng: np.random.Generator) -> Array:
+    """A wild control polygon made of a straight one, (n, 3)."""
+    n = len(polygon)
+    kind = rng.integers(4)
+    noise = rng.uniform(-1.0, 1.0, size=polygon.shape)
+    noise[:, 1] *= plane is None
+    if kind == 0:
+        return polygon + rng.uniform(0.0, 2.0) * noise
+    if kind == 1:
+        first = int(rng.integers(0, n - 3))
+        polygon[first : first + 4] = polygon[first]
+    elif kind == 2:
+        fold = int(rng.integers(1, n - 1))
+        polygon[fold:] = 2.0 * polygon[fold] - polygon[fold:]
+    else:
+        polygon += 0.02 * noise
+    return polygon
+
+
+def run_random_states(
+    n_states: int, rng: np.random.Generator, advance: Callable[[int], None]
+) -> Tally:
+    """Takes N_STEPS steps from each of n_states random states and counts how they end."""
+    tally = Tally()
+    for k in range(n_states):
+        hose = make_random_hose(rng)
+        before = hose.control_points
+        try:
+            for _ in range(N_STEPS):
+                before = hose.control_points
+                hose.step()
+        except StepError:
+            tally.verdicts += 1
+            tally.touched += not np.array_equal(before, hose.control_points)
+        tally.with_fallback += hose.fallbacks > 0
+        everything = np.concatenate([hose.control_points.ravel(), hose.control_velocities.ravel()])
+        tally.not_finite += not np.all(np.isfinite(everything))
+        if k % 200 == 199:
+            advance(200)
+    return tally

@@ -1,0 +1,130 @@
+"""`hose-mj compare`: GEDS against MuJoCo's cable and closed forms."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from hose_mj.checks import Check
+from hose_mj.errors import InputError
+from tools.document import make_document, print_document
+
+MODELS = ("geds", "cable", "hinge-chain")
+
+
+@dataclass(frozen=True)
+class Args:
+    """Compare the GEDS hose with MuJoCo's composite cable and with closed forms.
+
+    Writes report.html (self-contained), plots as PNG, the numbers as records.parquet and
+    records.csv, and models.rrd, a Rerun recording with the models overlaid.
+    """
+
+    cases: tuple[str, ...] = ()
+    """Case ids or families; all of them by default, with the checks of GEDS's own numerics."""
+    models: Annotated[tuple[str, ...], tyro.conf.arg(metavar="{geds,cable,hinge-chain}")] = MODELS
+    """Models to run."""
+    out: Path = Path("out/compare")
+    """Folder for the report, the plots, the numbers and the recording."""
+    quick: bool = False
+    """A smaller grid: the cable at 20 and 40 segments, under 45 s once compiled."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """Seed of the random states."""
+
+
+def run(args: Args) -> int:
+    """Runs the comparison; 1 if a check failed."""
+    from hose_mj.validation.cases import find_cases
+    from tools.compare_output import write_all
+    from tools.compare_study import run_study
+
+    for model in args.models:
+        if model not in MODELS:
+            raise InputError("model", model, ", ".join(MODELS))
+    if not args.models:
+        raise InputError("models", args.models, f"one or more of {', '.join(MODELS)}")
+    cases = find_cases(args.cases)
+    begun = time.perf_counter()
+    with show_progress() as advance:
+        study = run_study(
+            cases,
+            args.models,
+            quick=args.quick,
+            seed=args.seed,
+            with_numerics=not args.cases and "geds" in args.models,
+            advance=advance,
+        )
+        document = make_document(
+            "compare",
+            args,
+            checks=study.checks,
+            results={
+                "records": [outcome.to_record() for outcome in study.outcomes],
+                "ratios": [asdict(ratio) for ratio in study.ratios],
+                "skipped": [
+                    {"case": item.case, "setting": item.setting.label, "why": item.why}
+                    for item in study.skipped
+                ],
+            },
+        )
+        advance("report")
+        report = write_all(study, document, args.out)
+    if args.json:
+        print_document(document)
+    else:
+        _summarize(study.checks, study.ratios)
+    failed = [check for check in study.checks if not check.ok]
+    seconds = time.perf_counter() - begun
+    stream = sys.stderr if args.json else sys.stdout
+    print(f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok, {seconds:.0f} s", file=stream)
+    print(f"report: {report.resolve()}", file=stream)
+    return 1 if failed else 0
+
+
+@contextmanager
+def show_progress() -> Iterator[Any]:
+    """A line on stderr that says what is being run; nothing where that is no terminal."""
+    from rich.console import Console
+    from rich.status import Status
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda text: None
+        return
+    with Status("starting", console=console) as status:
+        yield status.update
+
+
+def _summarize(checks: list[Check], ratios: list[Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    table = Table(title="Checks")
+    for name in ("", "what", "value", "limit"):
+        table.add_column(name, justify="left" if name in ("", "what") else "right")
+    for check in checks:
+        mark = "[green]ok[/]" if check.ok else "[red]failed[/]"
+        table.add_row(mark, check.name, f"{check.value:.3g}", f"{check.comparison} {check.limit:g}")
+    console.print(table)
+    table = Table(title="Wall time at equal error, each model at its cheapest setting")
+    for name in ("case", "error", "times cheaper", "GEDS", "against"):
+        table.add_column(name, justify="right" if name in ("error", "times cheaper") else "left")
+    for ratio in ratios:
+        table.add_row(
+            ratio.case,
+            f"{100 * ratio.at_error:g} %",
+            f"{ratio.wall_ratio:.1f}",
+            ratio.model_setting.removeprefix("geds, "),
+            ratio.against_setting,
+        )
+    console.print(table)

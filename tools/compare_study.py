@@ -1,0 +1,111 @@
+"""Gathers what `hose-mj compare` runs: the cases, and GEDS's own numerics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hose_mj.checks import Check
+from hose_mj.validation import numerics
+from hose_mj.validation.cases import Case
+from hose_mj.validation.compare import (
+    CaseResult,
+    Ratio,
+    check_motions,
+    check_statics,
+    compute_ratios,
+    run_case,
+)
+from hose_mj.validation.run import Outcome, Skipped
+from hose_mj.validation.settings import FULL, QUICK
+
+N_RANDOM_STATES = 100_000
+N_RANDOM_STATES_QUICK = 2_000
+
+
+@dataclass
+class Study:
+    """Everything that was measured.
+
+    Attributes:
+        results: one per case.
+        checks: of the cases, then of the numerics.
+        ratios: at equal error.
+        curves: convergence plots by title.
+        energy: times (s) and energy over its start of the ten-second swing; None if not run.
+        quick: whether the small grid was used.
+    """
+
+    results: list[CaseResult] = field(default_factory=list)
+    checks: list[Check] = field(default_factory=list)
+    ratios: list[Ratio] = field(default_factory=list)
+    curves: dict[str, numerics.Curves] = field(default_factory=dict)
+    energy: tuple[list[float], list[float]] | None = None
+    quick: bool = False
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """All scored runs."""
+        return [outcome for result in self.results for outcome in result.outcomes]
+
+    @property
+    def skipped(self) -> list[Skipped]:
+        """All settings that were not scored."""
+        return [item for result in self.results for item in result.skipped]
+
+
+def run_study(
+    cases: tuple[Case, ...],
+    models: tuple[str, ...],
+    *,
+    quick: bool,
+    seed: int,
+    with_numerics: bool,
+    advance: Callable[[str], None],
+) -> Study:
+    """Runs the cases and, if wanted, the numerics; `advance` is told what comes next."""
+    study = Study(quick=quick)
+    grid = QUICK if quick else FULL
+    for place, case in enumerate(cases):
+        head = f"{place + 1}/{len(cases)} {case.id}"
+        study.results.append(
+            run_case(case, models, grid, lambda text, head=head: advance(f"{head}: {text}"))  # type: ignore[misc]
+        )
+    study.checks += check_statics(study.results)
+    for result in study.results:
+        if result.case.motion is not None:
+            study.checks += check_motions(result)
+            study.ratios += compute_ratios(result)
+    if with_numerics:
+        _run_numerics(study, np.random.default_rng(seed), advance)
+    return study
+
+
+def _run_numerics(study: Study, rng: np.random.Generator, advance: Callable[[str], None]) -> None:
+    for title, measure in (
+        ("Error of the frequencies over the span length", numerics.check_frequency_order),
+        ("Error of the swing over the span length", numerics.check_swing_order),
+        ("Error over the time step", numerics.check_time_order),
+        ("Wall time of a step over the control points", numerics.check_cost),
+    ):
+        advance(title)
+        checks, study.curves[title] = measure()
+        study.checks += checks
+    advance("momenta")
+    study.checks += numerics.check_momenta()
+    advance("energy")
+    checks, study.energy = numerics.check_energy()
+    study.checks += checks
+    advance("suture thread")
+    study.checks += numerics.check_suture()
+    wanted = N_RANDOM_STATES_QUICK if study.quick else N_RANDOM_STATES
+    done = 0
+
+    def count(more: int) -> None:
+        nonlocal done
+        done += more
+        advance(f"random states {done}/{wanted}")
+
+    study.checks += numerics.check_random_states(wanted, rng, count)

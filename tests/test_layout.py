@@ -167,8 +167,9 @@ def test_kernels_import_no_class_of_ours(module):
         ("hose_mj.errors", "import tools.cli"),
         ("hose_mj.envs.gym", "from learning import tables"),
         ("hose_mj.hoses.geds", "from hose_mj.world import world"),
-        ("hose_mj.hoses.spec", "from hose_mj.hoses.model import HoseModel"),
-        ("hose_mj.hoses.cable", "from hose_mj import HoseSpec"),
+        ("hose_mj.hoses.spec", "from hose_mj.hoses.model import HoseModel")(
+            "hose_mj.hoses.cable", "from hose_mj import HoseSpec"
+        ),
         ("hose_mj.hoses.cable", "from hose_mj.scenes.mjcf import read_scene"),
         ("hose_mj.recording.episode", "from hose_mj.hoses import spec"),
         ("hose_mj.errors", "from .hoses import spec"),
@@ -188,8 +189,9 @@ def test_the_rules_catch(module, line):
     [
         ("hose_mj.recording.rerun", "import rerun as rr"),
         ("hose_mj.recording.rerun", "from hose_mj.recording.episode import Scene"),
-        ("hose_mj.world.world", "from hose_mj.hoses.model import HoseModel"),
-        ("hose_mj.envs.gym", "from hose_mj.tasks.line import Line"),
+        ("hose_mj.world.world", "from hose_mj.hoses.model import HoseModel")(
+            "hose_mj.envs.gym", "from hose_mj.tasks.line import Line"
+        ),
         ("learning.loop", "from hose_mj import InputError"),
         ("learning.loop", "from hose_mj.envs.turns import make"),
         ("tools.view", "from hose_mj.recording import rerun"),

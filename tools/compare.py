@@ -85,7 +85,10 @@ def run(args: Args) -> int:
     failed = [check for check in study.checks if not check.ok]
     seconds = time.perf_counter() - begun
     stream = sys.stderr if args.json else sys.stdout
-    print(f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok, {seconds:.0f} s", file=stream)
+    print(
+        f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok, {seconds:.0f} s",
+        file=stream,
+    )
     print(f"report: {report.resolve()}", file=stream)
     return 1 if failed else 0
 

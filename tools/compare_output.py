@@ -112,7 +112,9 @@ def make_scene(result: CaseResult) -> Scene | None:
         for model, outcome in shown.items()
     )
     series = tuple(
-        Series(f"{model} to geds", shown[model].times, compute_distance(shown["geds"], outcome), "m")
+        Series(
+            f"{model} to geds", shown[model].times, compute_distance(shown["geds"], outcome), "m"
+        )
         for model, outcome in shown.items()
         if model != "geds" and "geds" in shown
     )

@@ -83,7 +83,10 @@ def _write_motion(section: Section, result: CaseResult, pictures: Plots) -> None
     block.paragraph(case.about)
     block.paragraph(_describe_references(result))
     for kind, caption in (
-        ("work-precision", "Error over wall time per simulated second; labels count segments or control points."),
+        (
+            "work-precision",
+            "Error over wall time per simulated second; labels count segments or control points.",
+        ),
         ("shapes", "Shapes at a few instants, the earlier the paler."),
         ("distance", "Distance between the models' centre lines over time."),
     ):
@@ -123,7 +126,16 @@ def _describe_references(result: CaseResult) -> str:
     return text
 
 
-_HEADER = ["model", "resolution", "time step", "scheme", "clamp", "error", "wall s / sim s", "fallbacks"]
+_HEADER = [
+    "model",
+    "resolution",
+    "time step",
+    "scheme",
+    "clamp",
+    "error",
+    "wall s / sim s",
+    "fallbacks",
+]
 
 
 def _row(outcome: Outcome) -> list[Any]:

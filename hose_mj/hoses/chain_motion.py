@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hose_mj.errors import InputError
 from hose_mj.hoses.chain_layout import ChainLayout, conjugate, multiply, rotation_vector
-from hose_mj.hoses.model import Array, Curve, Energies, Momentum
+from hose_mj.hoses.model import Array, Energies, Momentum
 
 
 @dataclass(frozen=True)
@@ -130,19 +129,3 @@ class ChainMotion:
         arms = np.einsum("nij,nj->ni", self.axes, mass.centre)
         velocities = self.start_velocities + np.cross(self.spins, arms)
         return self.starts + arms, velocities, np.einsum("nij,ni->nj", self.axes, self.spins)
-
-
-def sample_velocity(velocity: Curve, layout: ChainLayout) -> Array:
-    """Returns velocities at the nodes (N + 1, 3); rows of an array are spread evenly over s."""
-    nodes = layout.nodes
-    if callable(velocity):
-        speeds = np.asarray(velocity(nodes), dtype=np.float64)
-    else:
-        rows = np.asarray(velocity, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 2:
-            raise InputError("velocity", rows.shape, "an array of shape (k, 3) with k >= 2")
-        even = np.linspace(0.0, layout.length, len(rows))
-        speeds = np.stack([np.interp(nodes, even, rows[:, c]) for c in range(3)], axis=1)
-    if speeds.shape != (len(nodes), 3) or not np.all(np.isfinite(speeds)):
-        raise InputError("velocity", speeds.shape, f"finite velocities of shape ({len(nodes)}, 3)")
-    return speeds

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.model import Array, check_vector
+from hose_mj.hoses.inputs import check_choice, check_count, check_vector
+from hose_mj.hoses.model import Array
 from hose_mj.hoses.spec import check_number
 
 INTEGRATORS = ("euler", "implicit", "implicitfast", "discrete", "rk4")
@@ -86,18 +87,6 @@ class ChainSettings:
         if self.hold_solref is None:
             return 2 * self.timestep, 1.0
         return float(self.hold_solref[0]), float(self.hold_solref[1])
-
-
-def check_count(name: str, value: object, least: int) -> None:
-    """Raises `InputError` unless `value` is a whole number of at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InputError(name, value, f"a whole number, {least} or more")
-
-
-def check_choice(name: str, value: object, valid: Sequence[str]) -> None:
-    """Raises `InputError` unless `value` is one of the valid words."""
-    if value not in valid:
-        raise InputError(name, value, "one of " + ", ".join(valid))
 
 
 def check_numbers(name: str, value: Sequence[float], count: int) -> Array:

@@ -18,7 +18,8 @@ from hose_mj.hoses.chain_layout import (
     rotation_matrix,
     rotation_vector,
 )
-from hose_mj.hoses.chain_settings import ChainSettings, check_choice
+from hose_mj.hoses.chain_settings import ChainSettings
+from hose_mj.hoses.inputs import check_choice
 from hose_mj.hoses.model import Array
 from hose_mj.hoses.mujoco_chain import MujocoChainHose
 from hose_mj.hoses.spec import HoseSpec

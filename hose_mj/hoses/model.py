@@ -14,7 +14,6 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
 
 Array = NDArray[np.float64]
@@ -201,59 +200,3 @@ class HoseModel(Protocol):
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot of this hose."""
         ...
-
-
-def check_arc_lengths(arc_length: ArrayLike, length: float, what: str = "arc_length") -> Array:
-    """Returns arc lengths as a float array (k,); raises `InputError` for one off the hose."""
-    values = np.atleast_1d(np.asarray(arc_length, dtype=np.float64))
-    if values.ndim != 1 or not np.all((values >= 0.0) & (values <= length)):
-        raise InputError(what, arc_length, f"numbers on the hose, 0 to {length} m")
-    return values
-
-
-def check_vector(name: str, value: ArrayLike) -> Array:
-    """Returns a finite vector of shape (3,); raises `InputError` otherwise."""
-    try:
-        vector = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(name, value, "three finite numbers") from None
-    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-        raise InputError(name, value, "three finite numbers")
-    return vector
-
-
-def sample_curve(curve: Curve, length: float, arc_lengths: Array) -> Array:
-    """Returns the positions (k, 3) of a curve at rest arc lengths (k,).
-
-    A polyline is sampled evenly by its own length (thesis A.3): its strain is the same everywhere.
-
-    Raises:
-        InputError: not finite, fewer than two points, a point repeated, or a length outside 0.5 to
-            2 times the hose's.
-    """
-    if callable(curve):
-        points = np.asarray(curve(arc_lengths), dtype=np.float64)
-        if points.shape != (len(arc_lengths), 3):
-            raise InputError("curve(arc_lengths)", points.shape, f"shape ({len(arc_lengths)}, 3)")
-        check_curve_points(points)
-        return points
-    points = np.asarray(curve, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
-        raise InputError("curve", points.shape, "an array of shape (k, 3) with k >= 2")
-    check_curve_points(points)
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    if not 0.5 * length <= along[-1] <= 2.0 * length:
-        raise InputError("length of the curve (m)", along[-1], f"0.5 to 2 times the hose's, {length}")
-    fraction = arc_lengths / length * along[-1]
-    return np.stack([np.interp(fraction, along, points[:, c]) for c in range(3)], axis=1)
-
-
-def check_curve_points(points: Array) -> None:
-    """Raises `InputError` for points that are not finite or repeat their neighbour."""
-    if not np.all(np.isfinite(points)):
-        bad = int(np.argmin(np.all(np.isfinite(points), axis=1)))
-        raise InputError(f"curve[{bad}]", points[bad].tolist(), "finite coordinates (m)")
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if np.any(steps == 0.0):
-        bad = int(np.argmin(steps)) + 1
-        raise InputError(f"curve[{bad}]", points[bad].tolist(), "a point apart from the one before it")

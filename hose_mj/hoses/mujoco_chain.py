@@ -27,21 +27,16 @@ from hose_mj.hoses.chain_holds import (
 from hose_mj.hoses.chain_kind import ChainKind
 from hose_mj.hoses.chain_layout import ChainLayout, rotation_matrix, transport_frames, turn_frame
 from hose_mj.hoses.chain_model import ChainModel
-from hose_mj.hoses.chain_motion import sample_velocity
-from hose_mj.hoses.chain_settings import ChainSettings, check_count
-from hose_mj.hoses.model import (
-    Array,
-    Curve,
-    Energies,
-    Hold,
-    Linearization,
-    Momentum,
-    Reaction,
+from hose_mj.hoses.chain_settings import ChainSettings
+from hose_mj.hoses.inputs import (
     check_arc_lengths,
+    check_count,
     check_curve_points,
     check_vector,
     sample_curve,
+    sample_velocity,
 )
+from hose_mj.hoses.model import Array, Curve, Energies, Hold, Linearization, Momentum, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 
@@ -109,7 +104,9 @@ class MujocoChainHose:
         points = sample_curve(curve, self.spec.length, layout.nodes)
         check_curve_points(points)
         self._kind.check_points("curve", points)
-        speeds = None if velocity is None else sample_velocity(velocity, layout)
+        speeds = (
+            None if velocity is None else sample_velocity(velocity, layout.length, layout.nodes)
+        )
         self._held: list[Held] = []
         self._loads: list[Load] = []
         self._chain = ChainModel(self._kind, self.spec, self.settings, [])
@@ -209,7 +206,8 @@ class MujocoChainHose:
         Raises:
             StepError: MuJoCo met a NaN or a huge number; the state before the call is kept.
         """
-        check_count("n_steps", n_steps, 1)
+        if check_count("n_steps", n_steps, 0) == 0:
+            return
         self._chain.step(n_steps, self._held, self._loads)
         self._held = [held.arrived() for held in self._held]
 

@@ -11,6 +11,7 @@ Rgb = tuple[int, int, int]
 
 COLORS: dict[str, Rgb] = {
     "geds": (0, 114, 178),
+    "geds planar": (86, 180, 233),
     "cable": (213, 94, 0),
     "flex": (0, 158, 115),
     "hinge-chain": (204, 121, 167),
@@ -18,13 +19,21 @@ COLORS: dict[str, Rgb] = {
 }
 MARKERS: dict[str, str] = {
     "geds": "o",
+    "geds planar": "v",
     "cable": "s",
     "flex": "^",
     "hinge-chain": "D",
     "reference": "x",
 }
+NAMES: dict[str, str] = {
+    "geds": "GEDS",
+    "geds planar": "GEDS planar",
+    "cable": "MuJoCo cable",
+    "flex": "MuJoCo flex",
+    "hinge-chain": "MuJoCo hinge chain",
+}
 LIMIT: Rgb = (160, 40, 40)
-OTHERS: tuple[Rgb, ...] = ((86, 180, 233), (230, 159, 0), (120, 94, 200), (100, 100, 60))
+OTHERS: tuple[Rgb, ...] = ((230, 159, 0), (0, 114, 178), (120, 94, 200), (100, 100, 60))
 
 
 def find_model(label: str) -> str | None:
@@ -40,6 +49,30 @@ def find_color(label: str, position: int = 0) -> Rgb:
     """Returns the colour of a label's model; without a model, the spare colour at `position`."""
     model = find_model(label)
     return COLORS[model] if model is not None else OTHERS[position % len(OTHERS)]
+
+
+def name_model(label: str) -> str:
+    """Returns a label with its model's id replaced by the name that people read."""
+    model = find_model(label)
+    return label if model is None else NAMES.get(model, model) + label[len(model) :]
+
+
+def mix(color: Rgb, other: Rgb, share: float) -> Rgb:
+    """Returns a colour with a share (0 to 1) of another one in it."""
+    red, green, blue = (
+        round((1.0 - share) * a + share * b) for a, b in zip(color, other, strict=True)
+    )
+    return red, green, blue
+
+
+def darken(color: Rgb, share: float = 0.3) -> Rgb:
+    """Returns a colour with black in it, so that small text in it reads well on white."""
+    return mix(color, (0, 0, 0), share)
+
+
+def lighten(color: Rgb, share: float) -> Rgb:
+    """Returns a colour with white in it."""
+    return mix(color, (255, 255, 255), share)
 
 
 def format_hex(color: Rgb) -> str:

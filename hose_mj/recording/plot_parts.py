@@ -1,4 +1,4 @@
-"""Pieces that several plots share: markers, levels, guides, logarithmic axes, checked input."""
+"""Pieces that several plots share: levels, slopes, logarithmic axes, units, checked input."""
 
 from __future__ import annotations
 
@@ -6,36 +6,47 @@ from collections.abc import Mapping, Sequence, Sized
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plot_style import Look, add_legend
+from hose_mj.recording.plot_labels import HALO
+from hose_mj.recording.plot_style import SOFT
 
 PLAIN = "#555555"
+ERRORS = (1e-2, 1e-3)
+"""Error levels drawn across plots."""
 
 
-def draw_markers(axes: Axes, x: Array, y: Array, look: Look, hollow: bool) -> None:
-    """Draws the points of one group, hollow or filled."""
-    face = "white" if hollow else look.color
-    axes.plot(x, y, ls="", marker=look.marker, color=look.color, mfc=face, mew=1.2, zorder=3)
-
-
-def draw_levels(axes: Axes, levels: Sequence[float], horizontal: bool) -> None:
-    """Draws thin lines across at levels that lie within half a decade of the axis' range."""
-    low, high = axes.get_ylim() if horizontal else axes.get_xlim()
-    line = axes.axhline if horizontal else axes.axvline
+def draw_levels(axes: Axes, levels: Sequence[float], *, named: bool = True) -> None:
+    """Draws thin lines across at errors within half a decade of the axis' range, with percents."""
+    low, high = axes.get_ylim()
     for level in levels:
         if low / 3.2 <= level <= high * 3.2:
-            line(level, color="#888888", lw=0.8, ls=(0, (1, 2)), zorder=1)
+            axes.axhline(level, color="#777777", lw=0.8, ls=(0, (1, 2)), zorder=1)
+            if named:
+                axes.annotate(
+                    format_percent(level),
+                    (1.0, level),
+                    xycoords=("axes fraction", "data"),
+                    xytext=(-2, 2),
+                    textcoords="offset points",
+                    ha="right",
+                    color=SOFT,
+                    fontsize=7.5,
+                    path_effects=HALO,
+                )
 
 
 def draw_slopes(
-    axes: Axes, groups: Mapping[str, tuple[Array, Array]], slopes: Sequence[float], sign: float
+    axes: Axes,
+    groups: Mapping[str, tuple[Array, Array]],
+    slopes: Sequence[float],
+    sign: float,
+    word: str = "order",
 ) -> None:
-    """Draws guides of given orders through the coarsest and worst point of all groups."""
+    """Draws guides of given orders above the coarsest and worst point of all groups."""
     x = np.concatenate([x for x, _ in groups.values()])
     y = np.concatenate([y for _, y in groups.values()])
     if not len(x):
@@ -46,19 +57,19 @@ def draw_slopes(
         ends = np.array([coarse, fine])
         levels = 2.0 * y.max() * (ends / coarse) ** (sign * slope)
         axes.plot(ends, levels, color="#999999", lw=0.8, ls=(0, (4, 3)), zorder=1)
-        inside = np.clip(limits[0] * 1.3, levels.min(), levels.max())
-        place = max(levels[1], inside)
-        at = coarse * (place / levels[0]) ** (1.0 / (sign * slope))
+        middle = np.sqrt(levels[0] * max(levels[1], 1.5 * limits[0]))
+        at = coarse * (middle / levels[0]) ** (1.0 / (sign * slope))
         axes.annotate(
-            f"order {slope:g}",
-            (at, place),
-            color="#777777",
+            f"{word} {slope:g}",
+            (at, middle),
+            color=SOFT,
             fontsize=7.5,
-            va="bottom" if sign < 0.0 else "top",
-            xytext=(4, 2 if sign < 0.0 else -2),
+            ha="right" if sign > 0.0 else "left",
+            va="bottom",
+            xytext=(-5 if sign > 0.0 else 5, 2),
             textcoords="offset points",
         )
-    axes.set_ylim(limits[0], max(limits[1], 2.8 * y.max()))
+    axes.set_ylim(limits[0], max(limits[1], 4.0 * y.max()))
 
 
 def set_log(axes: Axes, x: bool, y: bool) -> None:
@@ -82,31 +93,26 @@ def label_resolutions(axes: Axes, x: Array) -> None:
     if 0 < len(values) <= 12 and np.all(np.diff(np.log(values)) > 0.12):
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xticks(values)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    else:
-        axes.xaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(2, 0.5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+        axes.set_xlim(values[0] / 1.12, values[-1] * 1.12)
 
 
-def add_model_legend(axes: Axes, looks: Mapping[str, Look], any_raw: bool, n_hidden: int) -> None:
-    """Names the models, says what hollow means, and how many points a log axis cannot show."""
-    handles = [
-        Line2D([], [], color=look.color, marker=look.marker, label=model)
-        for model, look in looks.items()
-    ]
-    if any_raw:
-        for face, text in (("white", "as it is"), (PLAIN, "clamp-corrected")):
-            handles.append(
-                Line2D([], [], color=PLAIN, ls="", marker="s", mfc=face, mew=1.2, label=text)
-            )
-    if n_hidden:
-        handles.append(Line2D([], [], ls="", label=f"{n_hidden} not drawn\n(not above 0)"))
-    add_legend(axes, handles)
+def format_percent(fraction: float) -> str:
+    """Returns "0.1 %"."""
+    return f"{100.0 * fraction:.6g} %"
 
 
-def choose_size(points: Array) -> tuple[float, float]:
-    """Returns a figure size (inches) near the aspect ratio of points (k, 2)."""
-    width, height = np.maximum(np.ptp(points, axis=0), 1e-9)
-    return 7.6, float(np.clip(5.2 * height / width + 1.0, 2.8, 5.6))
+def format_seconds(seconds: float) -> str:
+    """Returns a time with the unit that suits it: "10 ms"."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= 0.999 * size:
+            return f"{seconds / size:.4g} {unit}"
+    return f"{1e9 * seconds:.4g} ns"
+
+
+def choose_length_unit(size: float) -> tuple[str, float]:
+    """Returns the unit for lengths up to `size` (m), and how many of it make a metre."""
+    return ("mm", 1e3) if size < 0.3 else ("m", 1.0)
 
 
 def is_positive(value: float) -> bool:

@@ -403,7 +403,7 @@ def _suture_pull() -> Case:
         outer_radius=0.2e-3,
         damping_time=2e-3,
     )
-    slack, pull, ramp = 0.098, 0.0095, 0.5
+    slack, pull, ramp = 0.098, 0.0105, 0.5
 
     def lay(hose: HoseModel) -> list[Hold]:
         hose.reset(

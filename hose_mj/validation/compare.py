@@ -214,15 +214,15 @@ def _check_released_rod(result: CaseResult) -> list[Check]:
             setting = outcome.setting
             place = (setting.model, setting.scheme, setting.resolution, setting.timestep)
             if place == ("geds", "bdf2", points, step):
-                text = f"released-rod: tip error, {points} control points at {1e3 * step:g} ms (of L)"
+                text = (
+                    f"released-rod: tip error, {points} control points at {1e3 * step:g} ms (of L)"
+                )
                 checks.append(Check(text, outcome.error, limit))
     for ratio in compute_ratios(result):
         planar = "planar" in ratio.model_setting
         # Like against like: the cable moves in space, the hinge chain in a plane.
         if planar == (ratio.against == "hinge-chain"):
-            text = (
-                f"released-rod: {ratio.against} over GEDS, wall time at {100 * ratio.at_error:g} % error"
-            )
+            text = f"released-rod: {ratio.against} over GEDS, wall time at {100 * ratio.at_error:g} % error"
             limit = _PROMISED[ratio.against, ratio.at_error]
             checks.append(Check(text, ratio.wall_ratio, limit, ">="))
     return checks

@@ -21,9 +21,7 @@ def compute_frequencies(small: Linearization, n_modes: int, above: float) -> Arr
     """
     basis = _free_basis(small)
     stiffness = basis.T @ small.stiffness @ basis
-    squares = eigh(
-        0.5 * (stiffness + stiffness.T), basis.T @ small.mass @ basis, eigvals_only=True
-    )
+    squares = eigh(0.5 * (stiffness + stiffness.T), basis.T @ small.mass @ basis, eigvals_only=True)
     frequencies = np.sqrt(np.maximum(squares, 0.0))
     distinct: list[float] = []
     for value in frequencies[frequencies > above]:

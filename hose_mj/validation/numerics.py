@@ -15,7 +15,7 @@ from hose_mj.checks import Check
 from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.model import Array
 from hose_mj.validation import reference
-from hose_mj.validation.cases import ROD, STOUT, Case, find_cases
+from hose_mj.validation.cases import ROD, Case, find_cases
 from hose_mj.validation.modes import compute_frequencies
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import Setting
@@ -34,8 +34,11 @@ def _find(case_id: str) -> Case:
 
 
 def check_frequency_order() -> tuple[list[Check], Curves]:
-    """Order of the first three frequencies in the span length, worst of three kinds of ends."""
-    spec = replace(STOUT, axial_stiffness=100.0 * STOUT.axial_stiffness)
+    """Order of the first three frequencies in the span length, worst of three kinds of ends.
+
+    Bending of a straight hose knows nothing of EA; the smaller one leaves less rounding error.
+    """
+    spec = ROD
     unit = np.sqrt(spec.bending_stiffness / (spec.linear_density * spec.length**4))
     points = (8, 10, 12, 16, 20)
     spans = [spec.length / (n - 3) for n in points]
@@ -88,7 +91,12 @@ def check_time_order() -> tuple[list[Check], Curves]:
 
     limit = (4.0 * move("sdirk2", steps[-1] / 16) - move("sdirk2", steps[-1] / 8)) / 3.0
     checks, curves = [], {}
-    for scheme, least in (("bdf2", 1.9), ("sdirk2", 1.9), ("midpoint", 1.9), ("backward-euler", 0.9)):
+    for scheme, least in (
+        ("bdf2", 1.9),
+        ("sdirk2", 1.9),
+        ("midpoint", 1.9),
+        ("backward-euler", 0.9),
+    ):
         errors = [float(np.max(np.abs(move(scheme, step) - limit))) for step in steps]
         order = measure_order(steps, errors)
         checks.append(Check(f"order of convergence in the time step, {scheme}", order, least, ">="))
@@ -154,9 +162,7 @@ def check_energy() -> tuple[list[Check], tuple[list[float], list[float]]]:
 def check_cost() -> tuple[list[Check], Curves]:
     """Cost of a step over the number of control points, in a plane and in space."""
     points = (16, 32, 64, 128, 256)
-    hoses = {
-        (plane, n): _make_swinging(plane, n) for plane in (None, "xz") for n in points
-    }
+    hoses = {(plane, n): _make_swinging(plane, n) for plane in (None, "xz") for n in points}
     least = {key: np.inf for key in hoses}
     for _ in range(7):
         for key, hose in hoses.items():
@@ -219,5 +225,3 @@ def check_random_states(
         Check("random states whose verdict changed the state", float(tally.touched), 0.0),
         Check("random states that needed a fallback", tally.with_fallback / n_states, 1.0),
     ]
-
-

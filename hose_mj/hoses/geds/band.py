@@ -38,14 +38,21 @@ def factorize(axes, size, band):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def solve_lower(axes, start, size, band, rhs):  # type: ignore[no-untyped-def]
-    """Solves L y = rhs in place; rhs (size + 4 d) vanishes before `start` and after `size`."""
+def solve_lower(axes, size, band, rows):  # type: ignore[no-untyped-def]
+    """Solves L y = rhs in place for every row of `rows` (m, size + 4 d), zero after `size`.
+
+    The rows advance together, so that the processor need not wait for the end of each.
+    """
     width = 4 * len(axes)
-    for j in range(start, size):
-        value = rhs[j] * band[j, 0]
-        rhs[j] = value
-        for k in range(1, width):
-            rhs[j + k] -= value * band[j, k]
+    for j in range(size):
+        inverse = band[j, 0]
+        for row in range(rows.shape[0]):
+            value = rows[row, j]
+            if value != 0.0:
+                value *= inverse
+                rows[row, j] = value
+                for k in range(width):
+                    rows[row, j + 1 + k] -= value * band[j, 1 + k]
 
 
 @kernel
@@ -53,7 +60,7 @@ def solve_upper(axes, size, band, rhs):  # type: ignore[no-untyped-def]
     """Solves L^T x = rhs in place; rhs (size + 4 d) vanishes after `size`."""
     width = 4 * len(axes)
     for j in range(size - 1, -1, -1):
-        value = rhs[j]
-        for k in range(1, width):
-            value -= band[j, k] * rhs[j + k]
-        rhs[j] = value * band[j, 0]
+        value = 0.0
+        for k in range(width):
+            value += band[j, 1 + k] * rhs[j + 1 + k]
+        rhs[j] = (rhs[j] - value) * band[j, 0]

@@ -47,7 +47,7 @@ def make_knots(n_control_points: int, length: float) -> Array:
 
 def make_greville(knots: Array) -> Array:
     """Returns the arc lengths at which control points rest on a straight hose, shape (n,)."""
-    return (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
+    return np.minimum((knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0, knots[-1])
 
 
 @compiled
@@ -72,7 +72,11 @@ def evaluate_basis(knots, arc_lengths, spans, values):  # type: ignore[no-untype
                 at = span + DEGREE - degree + i
                 value = 0.0
                 if i > 0:
-                    value += (s - knots[at]) / (knots[at + degree] - knots[at]) * lower[degree - 1, i - 1]
+                    value += (
+                        (s - knots[at])
+                        / (knots[at + degree] - knots[at])
+                        * lower[degree - 1, i - 1]
+                    )
                 if i < degree:
                     gap = knots[at + degree + 1] - knots[at + 1]
                     value += (knots[at + degree + 1] - s) / gap * lower[degree - 1, i]

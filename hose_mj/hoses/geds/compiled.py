@@ -25,26 +25,14 @@ compiled = numba.njit(**_OPTIONS)
 kernel = numba.njit(**_OPTIONS, _nrt=False)
 
 
-_announced: set[object] = set()
-
-
 @contextmanager
-def compile_notice(what: str, version: object = None) -> Iterator[None]:
-    """Says on stderr that kernels are being compiled when the block takes over a second.
-
-    Args:
-        what: their name, for the message.
-        version: what the compiled code depends on; the first block of each version is watched.
-    """
-    if (what, version) in _announced:
-        yield
-        return
+def compile_notice(what: str) -> Iterator[None]:
+    """Says on stderr that kernels are being compiled when the block takes over a second."""
     notice = f"hose_mj: compiling the {what} (once on this machine, under 30 s) ...\n"
     timer = threading.Timer(1.0, lambda: sys.stderr.write(notice))
     timer.daemon = True
     timer.start()
     try:
         yield
-        _announced.add((what, version))
     finally:
         timer.cancel()

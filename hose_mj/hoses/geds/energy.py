@@ -90,7 +90,8 @@ def _stretch(A):  # type: ignore[no-untyped-def]
     """|a| and its first two derivatives by A."""
     if A >= SMALLEST_A:
         stretch = np.sqrt(A)
-        return stretch, 0.5 / stretch, -0.25 / (A * stretch)
+        slope = 0.5 * stretch / A
+        return stretch, slope, -0.5 * slope / A
     root = np.sqrt(SMALLEST_A)
     u = A / SMALLEST_A
     return (
@@ -102,21 +103,20 @@ def _stretch(A):  # type: ignore[no-untyped-def]
 
 @kernel
 def _inverse_square(A):  # type: ignore[no-untyped-def]
-    """1 / A^2 and its first two derivatives by A."""
+    """P = 1 / A^2, s = P' / (2 P) and P'' (derivatives by A)."""
     if A >= SMALLEST_A:
         inverse = 1.0 / A
         square = inverse * inverse
-        return square, -2.0 * square * inverse, 6.0 * square * square
+        return square, -inverse, 6.0 * square * square
     # 1 / phi^2 with phi / SMALLEST_A = 1/3 + u^2 - u^3/3.
     u = A / SMALLEST_A
-    phi = SMALLEST_A * (1.0 / 3.0 + u * u - u * u * u / 3.0)
+    inverse = 1.0 / (SMALLEST_A * (1.0 / 3.0 + u * u - u * u * u / 3.0))
+    square = inverse * inverse
     slope = 2.0 * u - u * u
     bend = (2.0 - 2.0 * u) / SMALLEST_A
-    inverse = 1.0 / phi
-    square = inverse * inverse
     return (
         square,
-        -2.0 * square * inverse * slope,
+        -inverse * slope,
         square * (6.0 * square * slope * slope - 2.0 * inverse * bend),
     )
 
@@ -181,7 +181,9 @@ def compute_energy(axes, tables, elasticity, x, p, strains):  # type: ignore[no-
             square = max(A * B - C * C, 0.0) * _inverse_square(A)[0]
             rest = elasticity.rest_curvature[e, g]
             if len(axes) == 2 and rest != 0.0:
-                curvature = (p.a[g, 0] * p.b[g, 1] - p.a[g, 1] * p.b[g, 0]) * np.sqrt(_inverse_square(A)[0])
+                curvature = (p.a[g, 0] * p.b[g, 1] - p.a[g, 1] * p.b[g, 0]) * np.sqrt(
+                    _inverse_square(A)[0]
+                )
                 square = (curvature - rest) ** 2
             weight = tables.weights[g] * tables.span_length
             bending += 0.5 * elasticity.bending_stiffness[e, g] * weight * square
@@ -204,13 +206,13 @@ def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped
         A += a[g, c] * a[g, c]
         B += b[g, c] * b[g, c]
         C += a[g, c] * b[g, c]
-    P, P1, P2 = _inverse_square(A)
+    P, s, P2 = _inverse_square(A)
+    P1 = 2.0 * s * P
     D = max(A * B - C * C, 0.0)
     for c in range(len(axes)):
         p.force[g, 0, c] = weight * (P * (B * a[g, c] - C * b[g, c]) + D * P1 * a[g, c])
         p.force[g, 1, c] = weight * P * (A * b[g, c] - C * a[g, c])
     # Coefficients of I, a a^T, a b^T, b a^T, b b^T in the blocks (a, a) and (a, b).
-    s = 0.5 * P1 / P
     both = weight * (exact + viscous) * P
     exact *= weight
     viscous *= weight * P
@@ -257,9 +259,8 @@ def _add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
         b_u += b[g, c] * u[g, c]
         a_v += a[g, c] * v[g, c]
         b_v += b[g, c] * v[g, c]
-    P, P1, _ = _inverse_square(A)
+    P, s, _ = _inverse_square(A)
     D = max(A * B - C * C, 0.0)
-    s = 0.5 * P1 / P
     weight *= P
     aa_1 = B + s * D
     aa_aa = 3.0 * s * B + 4.0 * s * s * D
@@ -284,10 +285,10 @@ def _add_rest_curvature(g, weight, exact, p):  # type: ignore[no-untyped-def]
     a = (p.a[g, 0], p.a[g, 1])
     b = (p.b[g, 0], p.b[g, 1])
     A = a[0] * a[0] + a[1] * a[1]
-    P, P1, P2 = _inverse_square(A)
+    P, s, P2 = _inverse_square(A)
     n = a[0] * b[1] - a[1] * b[0]
     u = np.sqrt(P)
-    u1 = 0.5 * P1 / u
+    u1 = s * u
     u2 = (0.5 * P2 - u1 * u1) / u
     by_a = (b[1], -b[0])
     by_b = (-a[1], a[0])
@@ -361,9 +362,13 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
         a0, a1, a2 = p.force[0, 0, c], p.force[1, 0, c], p.force[2, 0, c]
         b0, b1, b2 = p.force[0, 1, c], p.force[1, 1, c], p.force[2, 1, c]
         for i in range(4):
-            along = a0 * tables.first[e, 0, i] + a1 * tables.first[e, 1, i] + a2 * tables.first[e, 2, i]
+            along = (
+                a0 * tables.first[e, 0, i] + a1 * tables.first[e, 1, i] + a2 * tables.first[e, 2, i]
+            )
             across = (
-                b0 * tables.second[e, 0, i] + b1 * tables.second[e, 1, i] + b2 * tables.second[e, 2, i]
+                b0 * tables.second[e, 0, i]
+                + b1 * tables.second[e, 1, i]
+                + b2 * tables.second[e, 2, i]
             )
             gradient[start + i * d + c] += along + across
     block = p.block

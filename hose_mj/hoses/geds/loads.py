@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from hose_mj.hoses.geds import solver
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.model import Array, check_vector
+from hose_mj.hoses.inputs import check_vector
+from hose_mj.hoses.model import Array
 
 
 class LoadSet:

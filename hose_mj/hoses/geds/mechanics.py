@@ -21,10 +21,18 @@ _STATIC_TURN = 0.5
 inextensibility."""
 
 
+_called: set[tuple[Callable[..., Any], int]] = set()
+
+
 def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
     """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
-    with compile_notice("GEDS kernels", (kernel.__name__, len(axes))):
+    version = (kernel, len(axes))
+    if version in _called:
         return kernel(axes, *arguments)
+    with compile_notice("GEDS kernels"):
+        result = kernel(axes, *arguments)
+    _called.add(version)
+    return result
 
 
 def check_scheme(scheme: str, spec: HoseSpec) -> None:
@@ -37,7 +45,7 @@ def check_scheme(scheme: str, spec: HoseSpec) -> None:
 
 def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
     """Returns what the kernels need to know of a uniform hose with these knots (n + 4,)."""
-    with compile_notice("GEDS kernels", "basis"):
+    with compile_notice("GEDS kernels"):
         tables = basis.make_tables(knots)
     n_spans = len(tables.first)
     elasticity = energy.Elasticity(

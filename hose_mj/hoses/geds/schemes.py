@@ -144,7 +144,17 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
             use = scheme if first else _BACKWARD_EULER
         parts = 1 if attempt < 2 else 8 ** (attempt - 1)
         verdict, h = _try_step(
-            axes, hose, holds, loads, limits if first else careful, use, dt, parts, state, work, counts
+            axes,
+            hose,
+            holds,
+            loads,
+            limits if first else careful,
+            use,
+            dt,
+            parts,
+            state,
+            work,
+            counts,
         )
         if verdict == DEPENDENT_HOLDS:
             return verdict

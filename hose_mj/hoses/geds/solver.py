@@ -106,7 +106,7 @@ class Work(NamedTuple):
     gradient: Array
     rate: Array
     band: Array
-    hold_rows: Array
+    lower: Array
     schur: Array
     multipliers: Array
     shift: Array
@@ -129,7 +129,7 @@ def make_work(n_control_points, dimension, n_rows):  # type: ignore[no-untyped-d
         np.zeros(padded),
         np.zeros(padded),
         np.zeros((padded, 8 * dimension)),
-        np.zeros((n_rows, padded)),
+        np.zeros((n_rows + 1, padded)),
         np.zeros((n_rows, n_rows)),
         np.zeros(n_rows),
         np.zeros(padded),
@@ -271,48 +271,38 @@ def solve_with_holds(axes, holds, size, work):  # type: ignore[no-untyped-def]
     """
     width = 4 * len(axes)
     m = len(holds.start)
-    rhs = work.gradient
-    for k in range(size):
-        rhs[k] = -rhs[k]
-    for k in range(size, len(rhs)):
-        rhs[k] = 0.0
-    solve_lower(axes, 0, size, work.band, rhs)
+    z = work.lower
     for row in range(m):
-        start = holds.start[row]
-        for k in range(size):
-            work.hold_rows[row, k] = 0.0
+        for k in range(z.shape[1]):
+            z[row, k] = 0.0
         for k in range(width):
-            work.hold_rows[row, start + k] = holds.rows[row, k]
-        _solve_row(axes, start, size, work.band, work.hold_rows, row)
+            z[row, holds.start[row] + k] = holds.rows[row, k]
+    for k in range(size):
+        z[m, k] = -work.gradient[k]
+    for k in range(size, z.shape[1]):
+        z[m, k] = 0.0
+    solve_lower(axes, size, work.band, z)
     for row in range(m):
-        value = work.shift[row]
-        for k in range(holds.start[row], size):
-            value -= work.hold_rows[row, k] * rhs[k]
-        work.multipliers[row] = value
+        product = 0.0
+        for k in range(size):
+            product += z[row, k] * z[m, k]
+        work.multipliers[row] = work.shift[row] - product
         for other in range(row + 1):
             product = 0.0
-            for k in range(max(holds.start[row], holds.start[other]), size):
-                product += work.hold_rows[row, k] * work.hold_rows[other, k]
+            for k in range(size):
+                product += z[row, k] * z[other, k]
             work.schur[row, other] = product
     if not _solve_dense(work.schur, work.multipliers):
         return False
-    for row in range(m):
-        factor = work.multipliers[row]
-        for k in range(holds.start[row], size):
-            rhs[k] += factor * work.hold_rows[row, k]
-    solve_upper(axes, size, work.band, rhs)
+    for k in range(size):
+        value = z[m, k]
+        for row in range(m):
+            value += work.multipliers[row] * z[row, k]
+        work.gradient[k] = value
+    for k in range(size, size + width):
+        work.gradient[k] = 0.0
+    solve_upper(axes, size, work.band, work.gradient)
     return True
-
-
-@kernel
-def _solve_row(axes, start, size, band, rows, row):  # type: ignore[no-untyped-def]
-    """`solve_lower` for one row of a matrix of right-hand sides."""
-    width = 4 * len(axes)
-    for j in range(start, size):
-        value = rows[row, j] * band[j, 0]
-        rows[row, j] = value
-        for k in range(1, width):
-            rows[row, j + k] -= value * band[j, k]
 
 
 @kernel

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis
-from hose_mj.hoses.model import Array, check_arc_lengths, check_vector
+from hose_mj.hoses.inputs import check_arc_lengths, check_count, check_vector
+from hose_mj.hoses.model import Array
 
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 FEWEST_CONTROL_POINTS = 5
@@ -162,13 +163,3 @@ class Spline:
             raise InputError("tangent", vector.tolist(), "a vector that is not zero")
         self.check_in_plane("tangent", vector / length, 1e-9)
         return vector / length
-
-
-def check_count(name: str, value: object, least: int, most: int | None = None) -> int:
-    """Returns a whole number from `least` to `most`; raises `InputError` for anything else."""
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    count = int(value) if whole else least - 1  # type: ignore[call-overload]
-    if count < least or (most is not None and count > most):
-        end = f"at or above {least}" if most is None else f"from {least} to {most}"
-        raise InputError(name, value, f"a whole number {end}")
-    return count

@@ -41,7 +41,7 @@ def test_factor_and_solves_match_scipy(d):
         wanted = scipy.linalg.solveh_banded(lower, rhs[:size], lower=True)
         assert banded.factorize(axes, size, packed)
         half = scipy.linalg.solve_triangular(np.linalg.cholesky(dense), rhs[:size], lower=True)
-        banded.solve_lower(axes, 0, size, packed, rhs)
+        banded.solve_lower(axes, size, packed, rhs[None])
         np.testing.assert_allclose(rhs[:size], half, rtol=1e-8, atol=1e-10 * np.abs(half).max())
         rhs[size:] = 0.0
         banded.solve_upper(axes, size, packed, rhs)

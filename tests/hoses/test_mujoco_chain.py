@@ -325,7 +325,7 @@ def test_bad_calls(model):
         lambda: hose.move(hold, tangent=[1, 0, 0]),
         lambda: hose.clamp(0.0, tangent=[0, 0, 0]),
         lambda: hose.apply_force(0.5, [math.nan, 0, 0]),
-        lambda: hose.step(0),
+        lambda: hose.step(-1),
         lambda: hose.reset(np.zeros((3, 3))),
         lambda: hose.restore({}),
     ]

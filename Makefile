@@ -11,14 +11,15 @@ DEV := $(VENV)/.installed-dev
 PINS := pyproject.toml constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint clean
+.PHONY: help demo test test-slow lint clean
 
 help:
-	@echo 'make demo    install, then compare the hose models in short form (report in out/demo)'
-	@echo 'make test    install with the dev extra, then ruff, mypy and pytest'
-	@echo '             PYTEST_ARGS="-m \"not slow\"" leaves out the slow tests'
-	@echo 'make lint    only ruff and mypy'
-	@echo 'make clean   remove $(VENV), build products, caches and out/demo (runs are kept)'
+	@echo 'make demo        install, then compare the hose models in short form (report in out/demo)'
+	@echo 'make test        install with the dev extra, then ruff, mypy and pytest'
+	@echo '                 PYTEST_ARGS="tests/tools -x" goes to pytest'
+	@echo 'make test-slow   only the slow tests, which make test leaves out'
+	@echo 'make lint        only ruff and mypy'
+	@echo 'make clean       remove $(VENV), build products, caches and out/demo (runs are kept)'
 	@echo ''
 	@echo 'PYTHON=/path/to/python picks the interpreter (3.11 or 3.12) of a new $(VENV);'
 	@echo 'VENV=folder puts it elsewhere. uv installs if it is on the PATH, pip otherwise.'
@@ -28,6 +29,9 @@ demo: $(CORE)
 
 test: lint
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+test-slow: $(DEV)
+	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from tools.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_mj.validation.cases import Case
+    from hose_mj.validation.compare import Ratio
 
 MODELS = ("geds", "cable", "hinge-chain")
 
@@ -43,39 +48,26 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs the comparison; 1 if a check failed."""
-    from hose_mj.validation.cases import find_cases
     from tools.compare_output import write_all
     from tools.compare_study import run_study
 
-    for model in args.models:
-        if model not in MODELS:
-            raise InputError("model", model, ", ".join(MODELS))
-    if not args.models:
-        raise InputError("models", args.models, f"one or more of {', '.join(MODELS)}")
-    cases = find_cases(args.cases)
+    cases = check_arguments(args)
     begun = time.perf_counter()
     with show_progress() as advance:
         study = run_study(
             cases,
-            args.models,
+            tuple(dict.fromkeys(args.models)),
             quick=args.quick,
             seed=args.seed,
             with_numerics=not args.cases and "geds" in args.models,
             advance=advance,
         )
-        document = make_document(
-            "compare",
-            args,
-            checks=study.checks,
-            results={
-                "records": [outcome.to_record() for outcome in study.outcomes],
-                "ratios": [asdict(ratio) for ratio in study.ratios],
-                "skipped": [
-                    {"case": item.case, "setting": item.setting.label, "why": item.why}
-                    for item in study.skipped
-                ],
-            },
-        )
+        results = {
+            "records": [outcome.to_record() for outcome in study.outcomes],
+            "ratios": [asdict(ratio) for ratio in study.ratios],
+            "skipped": [item.to_record() for item in study.skipped],
+        }
+        document = make_document("compare", args, checks=study.checks, results=results)
         advance("report")
         report = write_all(study, document, args.out)
     if args.json:
@@ -84,13 +76,40 @@ def run(args: Args) -> int:
         _summarize(study.checks, study.ratios)
     failed = [check for check in study.checks if not check.ok]
     seconds = time.perf_counter() - begun
+    passed = f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok"
     stream = sys.stderr if args.json else sys.stdout
-    print(
-        f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok, {seconds:.0f} s",
-        file=stream,
-    )
-    print(f"report: {report.resolve()}", file=stream)
+    print(f"{passed}, {seconds:.0f} s\nreport: {report.resolve()}", file=stream)
     return 1 if failed else 0
+
+
+def check_arguments(args: Args) -> tuple[Case, ...]:
+    """Returns the cases to run, those that some chosen model runs; makes the folder `out`.
+
+    Raises:
+        InputError: an unknown case or model, no case left, a bad seed or folder.
+    """
+    from hose_mj.validation.cases import find_cases
+
+    for model in args.models:
+        if model not in MODELS:
+            raise InputError("model", model, ", ".join(MODELS))
+    if not args.models:
+        raise InputError("models", args.models, f"one or more of {', '.join(MODELS)}")
+    if args.seed < 0:
+        raise InputError("seed", args.seed, "a whole number, at least 0")
+    found = find_cases(args.cases)
+    cases = tuple(case for case in found if set(case.models) & set(args.models))
+    if not cases:
+        run_with = dict.fromkeys(model for case in found for model in case.models)
+        raise InputError("models", args.models, f"for these cases one of {', '.join(run_with)}")
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        valid = f"a folder, or a place where one can be made ({error.strerror})"
+        raise InputError("out", str(args.out), valid) from error
+    if not os.access(args.out, os.W_OK):
+        raise InputError("out", str(args.out), "a folder that you may write to")
+    return cases
 
 
 @contextmanager
@@ -107,7 +126,7 @@ def show_progress() -> Iterator[Any]:
         yield status.update
 
 
-def _summarize(checks: list[Check], ratios: list[Any]) -> None:
+def _summarize(checks: list[Check], ratios: list[Ratio]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -119,6 +138,8 @@ def _summarize(checks: list[Check], ratios: list[Any]) -> None:
         mark = "[green]ok[/]" if check.ok else "[red]failed[/]"
         table.add_row(mark, check.name, f"{check.value:.3g}", f"{check.comparison} {check.limit:g}")
     console.print(table)
+    if not ratios:
+        return
     table = Table(title="Wall time at equal error, each model at its cheapest setting")
     for name in ("case", "error", "times cheaper", "GEDS", "against"):
         table.add_column(name, justify="right" if name in ("error", "times cheaper") else "left")

@@ -2,104 +2,169 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hose_mj.recording.page import Block, Page, Picture, Section
-from hose_mj.validation.compare import EQUAL_ERRORS, CaseResult, find_cheapest
+from hose_mj.recording.palette import name_model
+from hose_mj.recording.plots import format_seconds
+from hose_mj.validation.compare import EQUAL_ERRORS, CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import Outcome
-from hose_mj.validation.settings import CABLE_TWIST, FULL, LARGEST_STEP, QUICK, STAGNATION
+from tools.compare_pictures import (
+    HERO,
+    Pictures,
+    choose_ratios,
+    group_statics,
+    name_setting,
+)
 from tools.compare_study import Study
+from tools.compare_texts import write_method, write_physics
 
-Plots = dict[str, bytes]
+_TIMES = "\u00d7"
+_HEADER = ["model", "resolution", "step", "scheme", "clamp", "error", "wall s / sim s", "fallbacks"]
+_STATIC_COLUMNS = (0, 1, 2, 5, 6)
+"""Columns of case and `_HEADER` that a static case fills."""
 
 
-def make_report(study: Study, document: dict[str, Any], pictures: Plots, path: Path) -> Path:
+def make_report(study: Study, document: dict[str, Any], pictures: Pictures, path: Path) -> Path:
     """Writes the page and returns its path."""
     machine = document["machine"]
     page = Page(
         "GEDS against MuJoCo's cable and closed forms",
-        subtitle=f"hose-mj {document['version']}, revision {document['revision']}",
+        subtitle=f"hose-mj {document['version']}, revision {str(document['revision'])[:12]}",
         footer=f"{machine['cpu']}, {machine['cores']} cores, {machine['os']}, "
         f"Python {machine['python']}, seed {document['seed']}",
     )
     _write_glance(page, study, pictures)
-    motions = [result for result in study.results if result.case.motion is not None]
-    if motions:
-        section = page.section("Motions")
-        section.paragraph(
-            "Error: largest distance from the converged motion over the whole run, as a fraction of "
-            "the length. Filled marks have MuJoCo's clamp corrected by half a segment, hollow ones "
-            "are as documented. Each line joins a model's best settings."
-        )
-        for result in motions:
-            _write_motion(section, result, pictures)
+    write_physics(page)
+    _write_motions(page, study, pictures)
     _write_statics(page, study, pictures)
-    _write_numerics(page, study, pictures)
-    _write_method(page, study)
+    _write_numerics(page, pictures)
+    write_method(page, study.quick)
     page.write(path)
     return path
 
 
-def _write_glance(page: Page, study: Study, pictures: Plots) -> None:
+def _write_glance(page: Page, study: Study, pictures: Pictures) -> None:
     section = page.section("At a glance")
     failed = [check for check in study.checks if not check.ok]
     section.paragraph(
-        f"**{len(study.checks) - len(failed)} of {len(study.checks)} checks hold.** GEDS is a cubic "
-        "spline with a banded implicit solve; MuJoCo's composite cable is a chain of rigid segments "
-        "with explicit elastic forces; the hinge chain is its cheapest planar form."
+        f"**{len(study.checks) - len(failed)} of {len(study.checks)} checks hold.** GEDS is a "
+        "cubic spline with a banded implicit solve; MuJoCo's composite cable is a chain of rigid "
+        "segments with explicit elastic forces; the hinge chain is its cheapest planar form."
     )
-    if "released-rod-work-precision" in pictures:
-        section.figure(
-            pictures["released-rod-work-precision"],
-            alt="Error over wall time for the released rod",
-            caption="Released rod: error over wall time per simulated second. Left and low is better.",
-        )
-    if study.ratios:
-        section.table(
-            ["case", "error", "GEDS is cheaper by", "GEDS at", "against"],
-            [
-                [
-                    ratio.case,
-                    f"{100 * ratio.at_error:g} %",
-                    f"{ratio.wall_ratio:.1f}\u00d7",
-                    ratio.model_setting.removeprefix("geds, "),
-                    ratio.against_setting,
-                ]
-                for ratio in study.ratios
-            ],
-            "Wall time at equal error, every model at its cheapest setting of the grid. Space "
-            "against the cable, plane against the hinge chain compares like with like.",
-        )
+    _write_verdict(section, study.ratios)
+    if "overview" in pictures:
+        section.figures([Picture(pictures["overview"], _OVERVIEW)])
+    pair = [
+        Picture(pictures[name], alt, alt)
+        for name, alt in _GLANCE_STATICS.items()
+        if name in pictures
+    ]
+    if pair:
+        section.figures(pair)
+    _write_ratios(section, study)
     if study.checks:
         section.subsection("Checks").checks(study.checks)
 
 
-def _write_motion(section: Section, result: CaseResult, pictures: Plots) -> None:
+_OVERVIEW = "The released rod: snapshots of the motion, and error over wall time of each model"
+_GLANCE_STATICS = {
+    "heavy-cantilever-shapes": "A cantilever under growing weight, \u0393 = \u03c1 g L\u00b3 / EI",
+    "heavy-cantilever": "Its error against the elastica, over the resolution",
+}
+
+
+def _write_verdict(section: Section, ratios: Sequence[Ratio]) -> None:
+    """A sentence for each equal error of the hero, or of the first case that has ratios."""
+    cases = list(dict.fromkeys(ratio.case for ratio in ratios))
+    if not cases:
+        return
+    case = HERO if HERO in cases else cases[0]
+    parts = []
+    for level in EQUAL_ERRORS:
+        found = [r for r in choose_ratios(ratios, case) if r.at_error == level]
+        if found:
+            texts = [f"the {name_model(r.against)} **{r.wall_ratio:.3g}{_TIMES}**" for r in found]
+            parts.append(f"at {100 * level:g} % error {' and '.join(texts)}")
+    name = case.replace("-", " ").capitalize()
+    section.paragraph(f"{name}, wall time over that of GEDS: {'; '.join(parts)}.")
+
+
+def _write_ratios(section: Section, study: Study) -> None:
+    cases = list(dict.fromkeys(ratio.case for ratio in study.ratios))
+    like = [ratio for case in cases for ratio in choose_ratios(study.ratios, case)]
+    header = ["case", "error", "against", "GEDS is cheaper by", "GEDS at", "the other at"]
+    if like:
+        caption = (
+            "Wall time at equal error, every model at its cheapest setting of the grid; like "
+            "against like: space against the cable, plane against the hinge chain."
+        )
+        section.table(header, [_ratio_row(ratio) for ratio in like], caption)
+    rest = [ratio for ratio in study.ratios if ratio not in like]
+    if rest:
+        fold = section.fold(f"{len(rest)} more ratios, space against plane")
+        fold.table(header, [_ratio_row(ratio) for ratio in rest])
+
+
+def _ratio_row(ratio: Ratio) -> list[object]:
+    labels = (ratio.model_setting, ratio.against_setting)
+    ours, theirs = (_shorten_label(label).partition(", ")[2] for label in labels)
+    level, times = f"{100 * ratio.at_error:g} %", f"{ratio.wall_ratio:.3g}{_TIMES}"
+    return [ratio.case, level, ratio.against, times, ours, theirs]
+
+
+def _shorten_label(label: str) -> str:
+    """A label without what goes without saying, and "0.833333 ms" written as "833 \u00b5s"."""
+    label = label.removesuffix(", clamp-corrected").replace("control ", "")
+    return re.sub(r"([\d.]+) ms", lambda m: format_seconds(1e-3 * float(m[1])), label)
+
+
+def _write_motions(page: Page, study: Study, pictures: Pictures) -> None:
+    motions = [result for result in study.results if result.case.motion is not None]
+    if not motions:
+        return
+    section = page.section("Motions")
+    section.paragraph(
+        "Error: largest distance from the converged motion over the whole run, as a fraction of "
+        "the length. A line joins a model's best settings, labelled with control points or "
+        "segments and time step; hollow marks on dotted lines have MuJoCo's clamp as documented, "
+        "filled ones have it corrected by half a segment. Bars along a level say how many times "
+        "as long the other model takes at equal error."
+    )
+    section.link("models.rrd: the motions overlaid, for the Rerun viewer", "models.rrd")
+    for result in motions:
+        _write_motion(section, result, pictures)
+
+
+def _write_motion(section: Section, result: CaseResult, pictures: Pictures) -> None:
     case = result.case
     block = section.subsection(case.title)
     block.paragraph(case.about)
     block.paragraph(_describe_references(result))
-    for kind, caption in (
-        (
-            "work-precision",
-            "Error over wall time per simulated second; labels count segments or control points.",
-        ),
-        ("shapes", "Shapes at a few instants, the earlier the paler."),
-        ("distance", "Distance between the models' centre lines over time."),
-    ):
-        name = f"{case.id}-{kind}"
-        if name in pictures:
-            block.figure(pictures[name], alt=f"{case.title}: {kind}", caption=caption)
-    rows = []
-    for at_error in EQUAL_ERRORS:
-        for model in case.models:
-            for planar in (False, True) if model == "geds" else (False,):
-                best = find_cheapest(result.outcomes, model, at_error, planar=planar)
-                if best is not None:
-                    rows.append([f"{100 * at_error:g} %", *_row(best)])
+    if f"{case.id}-work-precision" in pictures:
+        block.figure(pictures[f"{case.id}-work-precision"], f"{case.title}: error over wall time")
+    pair = [
+        Picture(pictures[f"{case.id}-{kind}"], f"{case.title}: {kind}", caption)
+        for kind, caption in (
+            ("shapes", "Shapes at a few instants, the earlier the paler."),
+            ("distance", "Distance between the models' centre lines over time."),
+        )
+        if f"{case.id}-{kind}" in pictures
+    ]
+    if pair:
+        block.figures(pair)
+    rows = [
+        [f"{100 * at_error:g} %", *_row(best)]
+        for at_error in EQUAL_ERRORS
+        for model in case.models
+        for planar in ((False, True) if model == "geds" else (False,))
+        if (best := find_cheapest(result.outcomes, model, at_error, planar=planar)) is not None
+    ]
     if rows:
         block.table(["within", *_HEADER], rows, "Cheapest settings.")
     _write_runs(block, result)
@@ -108,12 +173,13 @@ def _write_motion(section: Section, result: CaseResult, pictures: Plots) -> None
 def _describe_references(result: CaseResult) -> str:
     parts = []
     for name, reference in (
-        ("The reference of GEDS", result.stretchable),
+        ("the reference of GEDS", result.stretchable),
         ("the inextensible one of the chains", result.inextensible),
     ):
         if reference is not None:
             parts.append(f"{name} is converged to {reference.uncertainty:.1e} L")
     text = ", ".join(parts) + "."
+    text = text[0].upper() + text[1:]
     if result.stretchable is not None and result.inextensible is not None and result.case.scale:
         gap = result.stretchable.values - result.inextensible.values
         largest = np.max(np.linalg.norm(gap.reshape(len(gap), -1, 3), axis=2)) / result.case.scale
@@ -126,27 +192,14 @@ def _describe_references(result: CaseResult) -> str:
     return text
 
 
-_HEADER = [
-    "model",
-    "resolution",
-    "time step",
-    "scheme",
-    "clamp",
-    "error",
-    "wall s / sim s",
-    "fallbacks",
-]
-
-
 def _row(outcome: Outcome) -> list[Any]:
     setting = outcome.setting
     clamp = {None: "", True: "corrected", False: "raw"}[setting.clamp_corrected]
-    step = "" if setting.timestep is None else f"{1e3 * setting.timestep:g} ms"
     wall = outcome.wall_s_per_sim_s
     return [
         setting.model,
         setting.resolution,
-        step,
+        "" if setting.timestep is None else name_setting(outcome).split(", ")[-1],
         setting.scheme,
         clamp,
         f"{100 * outcome.error:.3g} %",
@@ -164,27 +217,37 @@ def _write_runs(block: Block, result: CaseResult) -> None:
         fold.table(["setting", "why"], [[s.setting.label, s.why] for s in result.skipped], "")
 
 
-def _write_statics(page: Page, study: Study, pictures: Plots) -> None:
-    statics = [result for result in study.results if result.case.motion is None]
-    if not statics:
+def _write_statics(page: Page, study: Study, pictures: Pictures) -> None:
+    groups = group_statics(study.results)
+    if not groups:
         return
     section = page.section("Statics and frequencies against closed forms")
-    families: dict[str, list[CaseResult]] = {}
-    for result in statics:
-        families.setdefault(result.case.family, []).append(result)
-    for family, members in families.items():
+    section.paragraph(
+        "A panel for each model, a line for each parameter, error over resolution. Dotted lines "
+        "through hollow marks have MuJoCo's clamp as documented."
+    )
+    header = ["case", *_HEADER]
+    for family, members in groups.items():
         block = section.subsection(family.replace("-", " ").capitalize())
         block.paragraph(members[0].case.about)
-        if family in pictures:
-            block.figure(pictures[family], alt=f"{family}: error by model and resolution")
-        fold = block.fold("Numbers")
+        kinds = {family: "error by model and resolution", f"{family}-shapes": "equilibria"}
+        drawn = [
+            Picture(pictures[name], f"{family}: {alt}")
+            for name, alt in kinds.items()
+            if name in pictures
+        ]
+        if len(drawn) > 1:
+            block.figures(drawn)
+        elif drawn:
+            block.figure(drawn[0].png, drawn[0].alt)
         rows = [[r.case.id, *_row(o)] for r in members for o in r.outcomes]
-        keep = [0, 1, 2, 5, 6, 8]
-        header = ["case", *_HEADER]
-        fold.table([header[k] for k in keep], [[row[k] for k in keep] for row in rows], "")
+        if rows:
+            columns = [header[k] for k in _STATIC_COLUMNS]
+            kept = [[row[k] for k in _STATIC_COLUMNS] for row in rows]
+            block.fold(f"All {len(rows)} numbers").table(columns, kept)
 
 
-def _write_numerics(page: Page, study: Study, pictures: Plots) -> None:
+def _write_numerics(page: Page, pictures: Pictures) -> None:
     names = [
         name
         for name in pictures
@@ -193,29 +256,5 @@ def _write_numerics(page: Page, study: Study, pictures: Plots) -> None:
     if not names:
         return
     section = page.section("GEDS's own numerics")
+    section.paragraph("Each line ends in its name and its measured slope.")
     section.figures([Picture(pictures[name], name.replace("-", " ")) for name in names])
-
-
-def _write_method(page: Page, study: Study) -> None:
-    grid = QUICK if study.quick else FULL
-    section = page.section("How it was measured")
-    section.definitions(
-        {
-            "GEDS control points": ", ".join(map(str, grid.dynamic["geds"])),
-            "chain segments": ", ".join(map(str, grid.dynamic["hinge-chain"])),
-            "GEDS schemes": ", ".join(grid.schemes["geds"]) + "; Newton tolerance 1e-3 L",
-            "cable integrators": ", ".join(grid.schemes["cable"]),
-            "hinge-chain integrators": ", ".join(grid.schemes["hinge-chain"]),
-            "MuJoCo solver": "Newton, 100 iterations, tolerance 1e-8, dense Jacobian (faster here)",
-            "longest run scored": f"{grid.longest_run:g} s",
-            "timing": f"least of {grid.rounds} rounds for short runs, all models in turn, one thread",
-        }
-    )
-    section.paragraph(
-        f"Chains start at {1e3 * LARGEST_STEP:g} ms and halve their time step until they are stable, "
-        f"then go on until a halving takes less than {100 * STAGNATION:g} % off the error. The cable's "
-        f"torsional stiffness is lowered to {CABLE_TWIST:g} EI in motions, all planar, which lets it take "
-        "larger steps. **Equal error** means: each model at its cheapest setting on this grid whose "
-        "error is within the bound. Chains are scored against the inextensible limit, GEDS against "
-        "the limit with its stiffness; raw clamps never count in ratios."
-    )

@@ -1,0 +1,1 @@
+"""Hose models: one spec, one protocol, GEDS and MuJoCo's chains behind it."""

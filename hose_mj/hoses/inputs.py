@@ -1,4 +1,4 @@
-"""Checks of what a user hands to a hose: each answers with one `InputError` or with clean arrays."""
+"""Checks of what a user hands to a hose: each answers with an `InputError` or clean arrays."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class HoseModel(Protocol):
         """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads.
 
         Raises:
-            InputError: a curve that is not finite, repeats a point or is far from the hose's length.
+            InputError: a curve that is not finite, repeats a point or is far from the length.
         """
         ...
 
@@ -138,7 +138,7 @@ class HoseModel(Protocol):
         ...
 
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
-        """Adds a point moment (3,) N m that acts until `clear_loads`; its part along the tangent twists."""
+        """Adds a point moment (3,) N m until `clear_loads`; its part along the tangent twists."""
         ...
 
     def clear_loads(self) -> None:
@@ -194,7 +194,7 @@ class HoseModel(Protocol):
         ...
 
     def snapshot(self) -> dict[str, Any]:
-        """All that a later `restore` needs to continue bit by bit: arrays and plain numbers only."""
+        """What `restore` needs to continue bit by bit: arrays and plain numbers only."""
         ...
 
     def restore(self, state: dict[str, Any]) -> None:

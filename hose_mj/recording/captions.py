@@ -4,6 +4,22 @@ from __future__ import annotations
 
 from hose_mj.recording.episode import Scene
 
+_QUANTITIES = {
+    "m": "Distance",
+    "mm": "Distance",
+    "m/s": "Speed",
+    "N": "Force",
+    "N m": "Moment",
+    "J": "Energy",
+    "rad": "Angle",
+}
+
+
+def name_quantity(unit: str) -> str:
+    """Returns the title of a plot of numbers in a unit: "Distance (mm)"."""
+    name = _QUANTITIES.get(unit, "Numbers")
+    return f"{name} ({unit})" if unit else name
+
 
 def format_settings(settings: dict[str, str]) -> str:
     """Returns the settings as a Markdown table."""
@@ -17,7 +33,7 @@ def format_legend(scene: Scene) -> str:
         f"| {_cell(t.name)} | {len(t.arc_lengths)} | {len(t.times)} | {1e3 * t.radius:.3g} |"
         for t in scene.tracks
     ]
-    head = ["| hose | points drawn | samples | radius (mm) |", "|---|---|---|---|"]
+    head = ["| hose | points | samples | radius (mm) |", "|---|---|---|---|"]
     return "\n".join([*head, *lines])
 
 

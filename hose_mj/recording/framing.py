@@ -12,7 +12,7 @@ _HALF_VIEW = float(np.tan(np.radians(27.5)))
 """The viewer's vertical field of view is 55 degrees."""
 _ASPECT = 1.4
 """Width over height that a view is assumed to have."""
-_THINNER = 0.7
+_THINNER = 0.55
 _FLAT = 1e-2
 """A scene is planar if it is this much thinner than it is large."""
 
@@ -29,6 +29,7 @@ class Framing:
         grid_distance: of the grid's plane from the origin, along the normal.
         grid_spacing: 1, 2 or 5 times a power of ten, about a tenth of the size.
         corner: upper left of the scene as seen from the eye, where the legend begins.
+        is_planar: whether the scene is flat, and seen straight on.
     """
 
     eye: Array
@@ -40,6 +41,7 @@ class Framing:
     grid_distance: float
     grid_spacing: float
     corner: Array
+    is_planar: bool
 
     @property
     def eye_up(self) -> Array:
@@ -50,15 +52,24 @@ class Framing:
     def clip_radii(self, scene: Scene) -> dict[str, float]:
         """Returns the radius that each track is drawn with (m), by name.
 
-        Thick enough to be seen, and thinner by name: of lines at one place the viewer draws the
-        first by name on top, so every one of a few that coincide still shows.
+        Thick enough to be seen, and each thinner than the one before it, so that all of a few that
+        coincide still show; see `compute_shifts`.
         """
-        names = sorted((track.name for track in scene.tracks), reverse=True)
-        real = {track.name: track.radius for track in scene.tracks}
+        low, high = 0.006 * self.size, 0.011 * self.size
         return {
-            name: _THINNER**rank * float(np.clip(real[name], 0.004 * self.size, 0.007 * self.size))
-            for rank, name in enumerate(names)
+            track.name: _THINNER**rank * float(np.clip(track.radius, low, high))
+            for rank, track in enumerate(scene.tracks)
         }
+
+    def compute_shifts(self, scene: Scene) -> dict[str, Array]:
+        """Returns how far each track is drawn off its place, towards the eye, (3,), by name.
+
+        In planar scenes, seen straight on, each hose lies in front of the one before it; the
+        recorded points stay as they are. Elsewhere nothing is shifted.
+        """
+        ahead = self.eye - self.target
+        step = 0.003 * self.size * ahead / np.linalg.norm(ahead) if self.is_planar else np.zeros(3)
+        return {track.name: rank * step for rank, track in enumerate(scene.tracks)}
 
     def place_legend(self, n: int) -> Array:
         """Returns n places in a column, downwards from the corner, (n, 3)."""
@@ -91,6 +102,7 @@ def compute_framing(scene: Scene) -> Framing:
         grid_distance=float(normal @ low),
         grid_spacing=round_spacing(0.1 * size),
         corner=(middle + np.array([left, 0.8 * half_height, 0.0])) @ axes,
+        is_planar=bool(flat),
     )
 
 

@@ -11,36 +11,26 @@ All text is escaped. In running text `code` and **strong** are marked as in Mark
 
 from __future__ import annotations
 
-import base64
 import re
-import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording.files import write_atomically
+from hose_mj.recording.page_checks import format_checks
+from hose_mj.recording.page_parts import (
+    Picture,
+    format_cell,
+    format_picture,
+    format_text,
+    format_value,
+    is_numeric,
+)
 from hose_mj.recording.page_style import CSS
 
-_PNG = b"\x89PNG\r\n\x1a\n"
-_MINUS, _TIMES, _DASH = "\u2212", "\u00d7", "\u2013"
-_NUMBER = re.compile(
-    rf"[-+{_MINUS}±<>≈~]?\s*(\d[\d\s.,]*|\.\d+|nan|inf)(e[-+{_MINUS}]?\d+)?\s*[%{_TIMES}]?",
-    re.IGNORECASE,
-)
-_BLANKS = {"", "-", _DASH}
-
-
-@dataclass(frozen=True)
-class Picture:
-    """PNG bytes with the words for those who cannot see it and those below it."""
-
-    png: bytes
-    alt: str
-    caption: str = ""
+__all__ = ["Block", "Fold", "Page", "Picture", "Section"]
 
 
 class Block:
@@ -82,11 +72,12 @@ class Block:
                 )
         cells = [[format_value(value) for value in row] for row in rows]
         right = [is_numeric([row[column] for row in cells]) for column in range(len(header))]
-        head = "".join(_cell("th", text, r) for text, r in zip(header, right, strict=True))
-        body = "".join(
-            f"<tr>{''.join(_cell('td', c, r) for c, r in zip(row, right, strict=True))}</tr>\n"
+        head = "".join(format_cell("th", text, r) for text, r in zip(header, right, strict=True))
+        rows_of_cells = [
+            "".join(format_cell("td", text, r) for text, r in zip(row, right, strict=True))
             for row in cells
-        )
+        ]
+        body = "".join(f"<tr>{row}</tr>\n" for row in rows_of_cells)
         title = f"<caption>{format_text(caption)}</caption>" if caption else ""
         self._parts.append(
             f'<div class="scroll"><table>{title}<thead><tr>{head}</tr></thead>\n'
@@ -103,8 +94,8 @@ class Block:
         self._parts.append(f'<div class="row">{inner}</div>')
 
     def checks(self, checks: Sequence[Check]) -> None:
-        """Adds a list of checks with badges."""
-        self._parts.append(f'<ul class="checks">{"".join(map(format_check, checks))}</ul>')
+        """Adds checks with badges: those that failed first, then all that hold, in groups."""
+        self._parts.append(format_checks(checks))
 
     def equation(self, text: str, number: str = "") -> None:
         """Adds a displayed equation in Unicode, with its number at the right."""
@@ -220,59 +211,3 @@ class Page(Block):
     def write(self, path: Path) -> None:
         """Writes the page; a reader sees the old file or the whole new one."""
         write_atomically(Path(path), self.render().encode("utf-8"))
-
-
-def format_text(text: str) -> str:
-    """Escapes a text and marks its `code` and **strong** words."""
-    pieces = re.split(r"`([^`]+)`", str(text))
-    return "".join(
-        f"<code>{escape(piece)}</code>"
-        if position % 2
-        else re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", escape(piece))
-        for position, piece in enumerate(pieces)
-    )
-
-
-def format_value(value: Any) -> str:
-    """Returns a table cell's text: four digits of a float, nothing for None."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.4g}".replace("-", _MINUS)
-    return str(value)
-
-
-def is_numeric(cells: Sequence[str]) -> bool:
-    """Whether a column has numbers and, but for blanks, nothing else."""
-    filled = [cell.strip() for cell in cells if cell.strip() not in _BLANKS]
-    return bool(filled) and all(_NUMBER.fullmatch(cell) for cell in filled)
-
-
-def format_check(check: Check) -> str:
-    """Returns one line of a check list."""
-    badge, word = ("ok", "ok") if check.ok else ("failed", "failed")
-    detail = f"{format_value(check.value)} (limit {check.comparison} {format_value(check.limit)})"
-    return (
-        f'<li><span class="badge {badge}">{word}</span><span>{format_text(check.name)}</span>'
-        f'<span class="detail">{format_text(detail)}</span></li>\n'
-    )
-
-
-def format_picture(picture: Picture) -> str:
-    """Returns a figure with its PNG inside."""
-    if not picture.png.startswith(_PNG):
-        raise InputError("png", picture.png[:8], "the bytes of a PNG picture")
-    width, height = struct.unpack(">II", picture.png[16:24])
-    caption = f"<figcaption>{format_text(picture.caption)}</figcaption>" if picture.caption else ""
-    data = base64.b64encode(picture.png).decode("ascii")
-    return (
-        f'<figure><div class="card"><img alt="{escape(picture.alt)}" width="{width}" '
-        f'height="{height}" src="data:image/png;base64,{data}"/></div>{caption}</figure>'
-    )
-
-
-def _cell(tag: str, text: str, right: bool) -> str:
-    kind = ' class="number"' if right else ""
-    return f"<{tag}{kind}>{format_text(text)}</{tag}>"

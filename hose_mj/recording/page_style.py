@@ -57,7 +57,8 @@ nav a:hover { text-decoration: underline; }
 table { border-collapse: collapse; font: .84rem/1.4 var(--sans);
   font-variant-numeric: tabular-nums lining-nums; border-top: 2px solid var(--ink);
   border-bottom: 2px solid var(--ink); min-width: 40%; }
-caption { caption-side: top; text-align: left; font: .95rem/1.45 var(--serif); color: var(--soft);
+caption { max-width: calc(100vw - 2.5rem); caption-side: top; text-align: left;
+  font: .95rem/1.45 var(--serif); color: var(--soft);
   padding-bottom: .5rem; }
 th, td { text-align: left; padding: .3rem .9rem .3rem 0; vertical-align: baseline; }
 th:last-child, td:last-child { padding-right: 0; }
@@ -71,7 +72,7 @@ dd { margin: 0; overflow-wrap: anywhere; }
 figure { margin: 1.5rem 0; break-inside: avoid; }
 figure .card { background: #ffffff; border: 1px solid var(--line); border-radius: 6px;
   padding: .7rem; overflow-x: auto; }
-figure img { display: block; width: 100%; max-width: 100%; height: auto; margin: 0 auto; }
+figure img { display: block; max-width: 100%; height: auto; margin: 0 auto; }
 figcaption { font-size: .94rem; line-height: 1.45; color: var(--soft); margin-top: .5rem; }
 .row { display: grid; gap: 1.2rem; width: min(92vw, 78rem); margin: 1.5rem 0 1.5rem 50%;
   transform: translateX(-50%);
@@ -82,6 +83,19 @@ ul.checks { list-style: none; padding: 0; margin: 1.1rem 0; font: .88rem/1.45 va
 ul.checks li { display: grid; grid-template-columns: 4.4rem 1fr auto; gap: .2rem .8rem;
   align-items: baseline; padding: .32rem 0; border-bottom: 1px solid var(--line); }
 ul.checks .detail { color: var(--soft); text-align: right; }
+.groups { columns: 2 22rem; column-gap: 2.2rem; margin: 1.1rem 0;
+  width: min(92vw, 68rem); margin-left: 50%; transform: translateX(-50%); }
+.groups table { width: 100%; margin: 0 0 1.2rem; font-size: .8rem; break-inside: avoid;
+  border-top: 0; border-bottom: 1px solid var(--line); }
+.groups caption { font: 600 .84rem/1.35 var(--sans); color: var(--ink); padding-bottom: .25rem;
+  border-bottom: 1px solid var(--ink); font-variant-numeric: lining-nums; }
+.groups caption span { font-weight: 400; color: var(--soft); white-space: nowrap;
+  padding-left: .5rem; }
+.groups td { padding: .2rem .7rem .2rem 0; overflow-wrap: anywhere; }
+.groups td:first-child { width: 4rem; white-space: nowrap; }
+.groups.one { columns: 1; width: auto; margin-left: 0; transform: none; }
+.groups td.number { width: 1%; }
+td.soft { color: var(--soft); }
 .badge { font: 600 .72rem/1 var(--sans); letter-spacing: .04em; text-align: center;
   padding: .32em .5em; border-radius: 3px; }
 .badge.ok { color: var(--ok); background: var(--ok-ground); }
@@ -96,6 +110,7 @@ footer { margin-top: 4rem; padding-top: .8rem; border-top: 1px solid var(--line)
   h1 { font-size: 1.65rem; }
   dl { grid-template-columns: 1fr; gap: 0; }
   dd { margin-bottom: .4rem; }
+  .scroll td { white-space: nowrap; }
   ul.checks li { grid-template-columns: 4.4rem 1fr; }
   ul.checks .detail { grid-column: 2; text-align: left; }
 }

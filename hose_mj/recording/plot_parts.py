@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Sized
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
@@ -19,14 +20,15 @@ ERRORS = (1e-2, 1e-3)
 """Error levels drawn across plots."""
 
 
-def draw_levels(axes: Axes, levels: Sequence[float], *, named: bool = True) -> None:
-    """Draws thin lines across at errors within half a decade of the axis' range, with percents."""
+def draw_levels(axes: Axes, levels: Sequence[float], *, named: bool = True) -> list[Text]:
+    """Draws lines across at errors within half a decade of the axis' range, named in percent."""
     low, high = axes.get_ylim()
+    names: list[Text] = []
     for level in levels:
         if low / 3.2 <= level <= high * 3.2:
             axes.axhline(level, color="#777777", lw=0.8, ls=(0, (1, 2)), zorder=1)
             if named:
-                axes.annotate(
+                name = axes.annotate(
                     format_percent(level),
                     (1.0, level),
                     xycoords=("axes fraction", "data"),
@@ -37,6 +39,8 @@ def draw_levels(axes: Axes, levels: Sequence[float], *, named: bool = True) -> N
                     fontsize=7.5,
                     path_effects=HALO,
                 )
+                names.append(name)
+    return names
 
 
 def draw_slopes(
@@ -68,6 +72,8 @@ def draw_slopes(
             va="bottom",
             xytext=(-5 if sign > 0.0 else 5, 2),
             textcoords="offset points",
+            path_effects=HALO,
+            zorder=5,
         )
     axes.set_ylim(limits[0], max(limits[1], 4.0 * y.max()))
 
@@ -105,9 +111,9 @@ def format_percent(fraction: float) -> str:
 def format_seconds(seconds: float) -> str:
     """Returns a time with the unit that suits it: "10 ms"."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= 0.999 * size:
-            return f"{seconds / size:.4g} {unit}"
-    return f"{1e9 * seconds:.4g} ns"
+        if seconds >= 0.9995 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{1e9 * seconds:.3g} ns"
 
 
 def choose_length_unit(size: float) -> tuple[str, float]:

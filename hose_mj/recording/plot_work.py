@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
-from matplotlib.transforms import ScaledTranslation
 
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import name_model
-from hose_mj.recording.plot_labels import HALO, Label, label_points
+from hose_mj.recording.plot_gaps import Gap, draw_gap, trace_gap
+from hose_mj.recording.plot_labels import Label, label_points
 from hose_mj.recording.plot_parts import (
     ERRORS,
     PLAIN,
@@ -28,6 +28,7 @@ from hose_mj.recording.plot_parts import (
     set_log,
 )
 from hose_mj.recording.plot_style import (
+    DPI,
     SOFT,
     Look,
     add_legend,
@@ -61,22 +62,6 @@ class WorkPoint:
         return self.clamp_corrected is False and not self.model.startswith("geds")
 
 
-@dataclass(frozen=True)
-class Gap:
-    """What a peer costs more at equal error.
-
-    Attributes:
-        at_error: the level, as a fraction.
-        against: model id of the peer.
-        cost, cost_against: wall over simulated time of the two.
-    """
-
-    at_error: float
-    against: str
-    cost: float
-    cost_against: float
-
-
 def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()) -> bytes:
     """Error against cost, both logarithmic; lower left is better.
 
@@ -86,15 +71,37 @@ def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[
     """
     check_some("points", points)
     with make_axes(title, (8.4, 5.4)) as (figure, axes):
-        handles = draw_work_precision(figure, axes, points, gaps)
-        add_legend(figure, handles)
+        drawing = draw_work_precision(axes, points, gaps)
+        add_legend(figure, drawing.handles)
+        label_work_precision(figure, axes, drawing)
         return encode_png(figure)
 
 
+@dataclass(frozen=True)
+class WorkDrawing:
+    """What was drawn, for its legend and its labels.
+
+    Attributes:
+        handles: what the legend has to hold.
+        fronts: of the series that are not raw.
+        lines: x and y of what labels keep off.
+        gaps: with an arrow each.
+        texts: already written.
+        looks: by model.
+    """
+
+    handles: list[Line2D]
+    fronts: list[list[WorkPoint]]
+    lines: list[tuple[Array, Array]]
+    gaps: Sequence[Gap]
+    texts: list[Text]
+    looks: Mapping[str, Look]
+
+
 def draw_work_precision(
-    figure: Figure, axes: Axes, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()
-) -> list[Line2D]:
-    """Draws the plot into axes and returns what its legend has to hold."""
+    axes: Axes, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()
+) -> WorkDrawing:
+    """Draws all but the labels of points into axes."""
     drawn = [p for p in points if is_positive(p.error) and is_positive(p.wall_s_per_sim_s)]
     looks = choose_looks(list(dict.fromkeys(p.model for p in points)))
     fronts = {
@@ -106,16 +113,26 @@ def draw_work_precision(
     axes.set_ylabel("error")
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: format_seconds(value)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_percent(value)))
-    draw_levels(axes, ERRORS)
+    texts = draw_levels(axes, ERRORS)
     _draw_real_time(axes)
-    texts = [_draw_gap(figure, axes, gap, looks[gap.against]) for gap in gaps]
+    texts += [draw_gap(axes, gap, looks[gap.against]) for gap in gaps]
     lines = [
         (np.array([p.wall_s_per_sim_s for p in front]), np.array([p.error for p in front]))
         for front in fronts.values()
     ]
-    wanted = _choose_labels([front for (_, raw), front in fronts.items() if not raw], looks)
-    label_points(figure, axes, wanted, lines, texts)
-    return _make_handles(looks, drawn, len(points) - len(drawn))
+    handles = _make_handles(looks, drawn, len(points) - len(drawn))
+    shown = [front for (_, raw), front in fronts.items() if not raw]
+    return WorkDrawing(handles, shown, lines, gaps, texts, looks)
+
+
+def label_work_precision(
+    figure: Figure, axes: Axes, drawing: WorkDrawing, spacing: float = 20.0
+) -> None:
+    """Labels front points `spacing` apart (points of length), once the rest is laid out."""
+    figure.draw_without_rendering()
+    lines = drawing.lines + [trace_gap(axes, gap) for gap in drawing.gaps]
+    wanted = _choose_labels(axes, drawing.fronts, drawing.looks, spacing)
+    label_points(figure, axes, wanted, lines, drawing.texts)
 
 
 def find_pareto_front(cost: Array, error: Array) -> Array:
@@ -174,60 +191,25 @@ def _draw_real_time(axes: Axes) -> None:
         )
 
 
-def _draw_gap(figure: Figure, axes: Axes, gap: Gap, look: Look) -> Text:
-    """An arrow along a level from one model's cost to the other's, with the ratio on it.
-
-    The cable's stands above the level, anyone else's below.
-    """
-    above = 1.0 if gap.against == "cable" else -1.0
-    shift = ScaledTranslation(0.0, above * 6.0 / 72.0, figure.dpi_scale_trans)
-    place = axes.transData + shift
-    axes.annotate(
-        "",
-        (gap.cost_against, gap.at_error),
-        (gap.cost, gap.at_error),
-        xycoords=place,
-        textcoords=place,
-        arrowprops={
-            "arrowstyle": "|-|,widthA=0.25,widthB=0.25",
-            "color": look.ink,
-            "lw": 0.9,
-            "shrinkA": 0.0,
-            "shrinkB": 0.0,
-        },
-        zorder=5,
-    )
-    ratio = gap.cost_against / gap.cost
-    share = 0.72 if above > 0.0 else 0.55
-    return axes.annotate(
-        f"{ratio:.0f}\u00d7" if ratio >= 10.0 else f"{ratio:.1f}\u00d7",
-        (gap.cost * ratio**share, gap.at_error),
-        xycoords=place,
-        xytext=(0.0, above * 1.5),
-        textcoords="offset points",
-        ha="center",
-        va="bottom" if above > 0.0 else "top",
-        color=look.ink,
-        fontsize=9.0,
-        fontweight="bold",
-        path_effects=HALO,
-        zorder=7,
-    )
-
-
 def _choose_labels(
-    fronts: Sequence[Sequence[WorkPoint]], looks: Mapping[str, Look]
+    axes: Axes,
+    fronts: Sequence[Sequence[WorkPoint]],
+    looks: Mapping[str, Look],
+    spacing: float,
 ) -> list[Label]:
-    """Labels of front points: first those that reach a level most cheaply, then the others."""
-    chosen: list[WorkPoint] = []
+    """Labels of front points: first those that reach a level most cheaply, then some others.
+
+    The others of a series stand `spacing` apart from all that were chosen before them.
+    """
+    first = [p for front in fronts for p in _find_reaching(front)]
+    chosen = list(first)
     for front in fronts:
-        chosen += [
-            min(reached, key=lambda p: p.wall_s_per_sim_s)
-            for level in ERRORS
-            if (reached := [p for p in front if p.error <= level])
-        ]
-    chosen += [front[end] for front in fronts for end in (0, -1) if front]
-    chosen += [p for front in fronts for p in front]
+        near = [_locate(axes, p) for p in first if p in front]
+        for p in (front[0], front[-1], *front):
+            here = _locate(axes, p)
+            if all(np.hypot(*(here - other)) >= spacing * DPI / 72.0 for other in near):
+                near.append(here)
+                chosen.append(p)
     return [
         Label(
             p.wall_s_per_sim_s,
@@ -238,6 +220,17 @@ def _choose_labels(
         )
         for p in dict.fromkeys(chosen)
     ]
+
+
+def _find_reaching(front: Sequence[WorkPoint]) -> list[WorkPoint]:
+    """The cheapest point below each level."""
+    reached = ([p for p in front if p.error <= level] for level in ERRORS)
+    return [min(some, key=lambda p: p.wall_s_per_sim_s) for some in reached if some]
+
+
+def _locate(axes: Axes, point: WorkPoint) -> Array:
+    """Where a point lies, in pixels."""
+    return np.asarray(axes.transData.transform((point.wall_s_per_sim_s, point.error)))
 
 
 def _make_handles(

@@ -25,25 +25,17 @@ from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.recording.captions import format_legend, format_settings
+from hose_mj.recording.captions import format_legend, format_settings, name_quantity
 from hose_mj.recording.episode import Array, HoseTrack, Scene, Series, check_unique
 from hose_mj.recording.files import make_temp_beside, replace_atomically, write_atomically
 from hose_mj.recording.framing import Framing, compute_framing
-from hose_mj.recording.palette import LIMIT, Rgb, find_color
+from hose_mj.recording.palette import LIMIT, Rgb, find_color, lighten, name_model
 from hose_mj.recording.viewer import Viewer, start_viewer
 
 APPLICATION_ID = "hose_mj"
 TIMELINE = "sim_time"
 _DARK = (17, 20, 24)
 _UNITLESS = "number"
-_QUANTITIES = {
-    "m": "Distance",
-    "m/s": "Speed",
-    "N": "Force",
-    "N m": "Moment",
-    "J": "Energy",
-    "rad": "Angle",
-}
 _STILL = 3  # pictures in a row that must agree before the viewer counts as done drawing
 
 
@@ -179,7 +171,8 @@ def _log_scene(stream: rr.RecordingStream, scene: Scene, framing: Framing) -> No
         _log_track(stream, scene, track, framing)
     _log_legend(stream, scene, framing)
     for position, series in enumerate(scene.series):
-        _log_series(stream, entity_of(scene, series), series, position)
+        width = 2.0 + 1.5 * (len(scene.series) - 1 - position)
+        _log_series(stream, entity_of(scene, series), series, position, width)
 
 
 def _log_track(
@@ -187,6 +180,8 @@ def _log_track(
 ) -> None:
     path = f"{scene.name}/hoses/{rr.escape_entity_path_part(track.name)}"
     radius = framing.clip_radii(scene)[track.name]
+    shift = framing.compute_shifts(scene)[track.name]
+    stream.log(path, rr.Transform3D(translation=shift), static=True)
     points = track.points.astype(np.float32)
     stream.log(path, rr.LineStrips3D.from_fields(radii=[radius], colors=[track.color]), static=True)
     stream.send_columns(path, [_time(track.times)], rr.LineStrips3D.columns(strips=points))
@@ -202,18 +197,22 @@ def _log_track(
 def _log_legend(stream: rr.RecordingStream, scene: Scene, framing: Framing) -> None:
     legend = rr.Points3D(
         framing.place_legend(len(scene.tracks)),
-        colors=[track.color for track in scene.tracks],
-        labels=[track.name for track in scene.tracks],
+        colors=[lighten(track.color, 0.3) for track in scene.tracks],
+        labels=[name_model(track.name) for track in scene.tracks],
         radii=0.0,
         show_labels=True,
     )
     stream.log(f"{scene.name}/legend", legend, static=True)
 
 
-def _log_series(stream: rr.RecordingStream, path: str, series: Series, position: int) -> None:
+def _log_series(
+    stream: rr.RecordingStream, path: str, series: Series, position: int, width: float
+) -> None:
     color = series.color or find_color(series.name, position)
     unit = f" ({series.unit})" if series.unit else ""
-    _log_scalars(stream, path, series.times, series.values, series.name + unit, color, 2.0)
+    _log_scalars(
+        stream, path, series.times, series.values, name_model(series.name) + unit, color, width
+    )
     if series.limit is not None:
         times = series.times[[0, -1]] if len(series.times) > 1 else series.times
         values = np.full(len(times), series.limit)
@@ -256,7 +255,7 @@ def make_blueprint(scenes: Sequence[Scene], framings: Sequence[Framing]) -> rrb.
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="paused", loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
     )
 
 
@@ -291,9 +290,8 @@ def _make_tab(scene: Scene, framing: Framing) -> rrb.Horizontal:
 
 def _make_plot(scene: Scene, unit: str) -> rrb.TimeSeriesView:
     origin = f"/{scene.name}/series/{rr.escape_entity_path_part(unit or _UNITLESS)}"
-    title = _QUANTITIES.get(unit, "Numbers")
     return rrb.TimeSeriesView(
         origin=origin,
-        name=f"{title} ({unit})" if unit else title,
+        name=name_quantity(unit),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=True),
     )

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -173,8 +174,8 @@ def _end_moment(turn: float, name: str) -> Case:
         id=f"end-moment-{name}",
         family="end-moment",
         title=f"Cantilever rolled up by an end moment, M L / EI = {name}",
-        about="A moment at the tip bends a weightless cantilever into an arc of a circle, closed at "
-        "2 pi. Compared: the place of the tip, as a fraction of the length.",
+        about="A moment at the tip bends a weightless cantilever into an arc of a circle, closed "
+        "at 2 pi. Compared: the place of the tip, as a fraction of the length.",
         spec=STOUT,
         gravity=(0.0, 0.0, 0.0),
         lay=_lay_cantilever,
@@ -241,8 +242,8 @@ def _hanging_chain() -> Case:
 def _sag(chord: float) -> CubicSpline:
     """A planar curve of length 1 between two points `chord` apart, by arc length.
 
-    Its angle is -a cos(pi s): no curvature at the ends, where a hinge has no moment, and the chord is
-    the Bessel function J0(a).
+    Its angle is -a cos(pi s): no curvature at the ends, where a hinge has no moment, and the chord
+    is the Bessel function J0(a).
     """
     a = brentq(lambda a: j0(a) - chord, 1e-6, 2.4)
     s = np.linspace(0.0, 1.0, 401)
@@ -263,25 +264,25 @@ def _lay_between(hose: HoseModel, span: float) -> list[Hold]:
 
 def _catenary() -> Case:
     ratio = 1.5
-    support: dict[int, Hold] = {}
+    supports: WeakKeyDictionary[HoseModel, Hold] = WeakKeyDictionary()
 
     def lay(hose: HoseModel) -> list[Hold]:
         holds = _lay_between(hose, LENGTH / ratio)
-        support[id(hose)] = holds[0]
+        supports[hose] = holds[0]
         return holds
 
     def probe(hose: HoseModel) -> Array:
         hose.solve_static()
         sag = -hose.position(0.5 * LENGTH)[0, 2]
-        pull = np.linalg.norm(hose.reaction(support.pop(id(hose))).force)
+        pull = np.linalg.norm(hose.reaction(supports[hose]).force)
         return np.array([sag / LENGTH, pull / _WEIGHT])
 
     return Case(
         id="catenary",
         family="catenary",
         title="Catenary, length 1.5 times the span",
-        about="A chain hangs between two points of one height. Compared: sag over length and pull on "
-        "a support over weight, with the catenary.",
+        about="A chain hangs between two points of one height. Compared: sag over length and pull "
+        "on a support over weight, with the catenary.",
         spec=CHAIN,
         gravity=(0.0, 0.0, -GRAVITY),
         lay=lay,
@@ -336,7 +337,7 @@ def _released_rod() -> Case:
 
 def _free_flight() -> Case:
     def flex(s: Array) -> Array:
-        """Symmetric, zero at both ends, with moment and shear that vanish there: f'' = s^2 (1 - s)^2."""
+        """Symmetric, zero at both ends, without moment and shear there: f'' = s^2 (1 - s)^2."""
         return s**4 / 12.0 - s**5 / 10.0 + s**6 / 30.0 - s / 60.0
 
     def speed(s: Array) -> Array:
@@ -354,8 +355,8 @@ def _free_flight() -> Case:
         id="free-flight",
         family="free-flight",
         title="Free flight: a straight hose thrown spinning and flexing, without gravity",
-        about="A straight hose is thrown at .5 m/s with a spin of 4 rad/s and a smooth flexing motion "
-        "on top. Compared: the places of both ends and the middle.",
+        about="A straight hose is thrown at .5 m/s with a spin of 4 rad/s and a smooth flexing "
+        "motion on top. Compared: the places of both ends and the middle.",
         spec=ROD,
         gravity=(0.0, 0.0, 0.0),
         lay=lay,
@@ -366,7 +367,7 @@ def _free_flight() -> Case:
 
 
 def _taut_pull() -> Case:
-    slack, taut, ramp = 0.8 * LENGTH, 0.995 * LENGTH, 1.0
+    slack, taut, ramp = 0.8 * LENGTH, 0.995 * LENGTH, 0.6
 
     def lay(hose: HoseModel) -> list[Hold]:
         return _lay_between(hose, slack)
@@ -382,14 +383,14 @@ def _taut_pull() -> Case:
         id="taut-pull-hose",
         family="taut-pull",
         title="Taut pull: two ends moved apart until the hose is taut, then held",
-        about="A sagging hose is let go between two attachments; one is drawn away from .8 to .995 L "
-        "within a second and held for another. Compared: the places of the quarter points.",
+        about="A sagging hose is let go between two attachments; one is drawn away from .8 to "
+        ".995 L within a second and held for another. Compared: the places of the quarter points.",
         spec=replace(ROD, damping_time=0.01),
         gravity=(0.0, 0.0, -GRAVITY),
         lay=lay,
         probe=probe,
         scale=LENGTH,
-        motion=Motion(2.0, 50, drive),
+        motion=Motion(1.0, 50, drive),
     )
 
 
@@ -403,7 +404,8 @@ def _suture_pull() -> Case:
         outer_radius=0.2e-3,
         damping_time=2e-3,
     )
-    slack, pull, ramp = 0.098, 0.0105, 0.5
+    slack, pull, ramp = 0.098, 0.0105, 0.3
+    starts: WeakKeyDictionary[HoseModel, Array] = WeakKeyDictionary()
 
     def lay(hose: HoseModel) -> list[Hold]:
         hose.reset(
@@ -413,15 +415,13 @@ def _suture_pull() -> Case:
         )
         ends = [hose.attach(0.0, (0.0, 0.0, 0.0)), hose.attach(length, (slack, 0.0, 0.0))]
         hose.solve_static()
+        starts[hose] = hose.position(0.5 * length)[0].copy()
         return [*ends, hose.attach(0.5 * length)]
 
     def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
-        start = starts.setdefault(id(holds[2]), hose.position(0.5 * length)[0].copy())
         along = 0.5 - 0.5 * math.cos(math.pi * min(time / ramp, 1.0))
         aim = np.array([0.5 * slack, 0.0, pull])
-        hose.move(holds[2], start + (aim - start) * along)
-
-    starts: dict[int, Array] = {}
+        hose.move(holds[2], starts[hose] + (aim - starts[hose]) * along)
 
     def probe(hose: HoseModel) -> Array:
         return np.asarray(hose.position(np.array([0.25, 0.75]) * length).ravel())
@@ -430,14 +430,14 @@ def _suture_pull() -> Case:
         id="taut-pull-suture",
         family="taut-pull",
         title="Taut pull: a suture thread drawn sideways at its middle",
-        about="10 cm of thread, radius .2 mm, E = 750 MPa, both ends held 98 mm apart; its middle is "
-        "drawn sideways until taut, then held. Compared: the places of the quarter points.",
+        about="10 cm of thread, radius .2 mm, E = 750 MPa, both ends held 98 mm apart; its middle "
+        "is drawn sideways until taut, then held. Compared: the places of the quarter points.",
         spec=spec,
         gravity=(0.0, 0.0, -GRAVITY),
         lay=lay,
         probe=probe,
         scale=length,
-        motion=Motion(1.0, 50, drive),
+        motion=Motion(0.5, 25, drive),
         models=("geds",),
         steps=(0.002, 0.001, 0.0005, 0.00025),
     )

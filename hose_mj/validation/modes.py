@@ -35,11 +35,11 @@ def compute_critical_load(
 ) -> float:
     """Returns the smallest thrust at which the straight state loses its stability (N).
 
-    The stiffness of a straight, nearly inextensible hose is linear in its tension, K0 + T Kg, so two
-    linearizations, unloaded and under a pull, give the thrusts P with K0 z = P Kg z. Solved in the
-    form K0 z = theta (K0 + pull Kg) z, P = pull theta / (1 - theta), whose right side is positive
-    definite; rigid rotations have theta = 0 and are left out, motions that swing below `above`
-    (rad/s) even under the pull, such as a spin about the axis, before.
+    The stiffness of a straight, nearly inextensible hose is linear in its tension, K0 + T Kg, so
+    two linearizations, unloaded and under a pull, give the thrusts P with K0 z = P Kg z. Solved in
+    the form K0 z = theta (K0 + pull Kg) z, P = pull theta / (1 - theta), whose right side is
+    positive definite. Rigid rotations have theta = 0 and are left out; so are, before, motions that
+    swing below `above` (rad/s) even under the pull, such as a spin about the axis.
     """
     basis = _free_basis(unloaded)
     right = basis.T @ pulled.stiffness @ basis

@@ -24,13 +24,11 @@ class Tally:
         not_finite: a position or velocity that is not finite.
         verdicts: a StepError.
         touched: a StepError after which the state was not the one before the failing step.
-        with_fallback: the solver needed a fallback.
     """
 
     not_finite: int = 0
     verdicts: int = 0
     touched: int = 0
-    with_fallback: int = 0
 
 
 def make_random_hose(rng: np.random.Generator) -> GedsHose:
@@ -104,7 +102,6 @@ def run_random_states(
         except StepError:
             tally.verdicts += 1
             tally.touched += not np.array_equal(before, hose.control_points)
-        tally.with_fallback += hose.fallbacks > 0
         everything = np.concatenate([hose.control_points.ravel(), hose.control_velocities.ravel()])
         tally.not_finite += not np.all(np.isfinite(everything))
         if k % 200 == 199:

@@ -39,7 +39,7 @@ def _shoot(load: float, weight: float) -> tuple[float, float]:
 
 
 def heavy_cantilever(gamma: float) -> float:
-    """Drop over width H / W of a heavy cantilever, gamma = rho A g L^3 / EI (Romero et al. 2021)."""
+    """Drop over width H / W of a heavy cantilever (Romero 2021), gamma = rho A g L^3 / EI."""
     x, y = _shoot(0.0, gamma)
     return y / x
 
@@ -83,7 +83,7 @@ def chain_frequencies(n_modes: int = 3) -> Array:
 
 
 def catenary(length_over_span: float) -> tuple[float, float]:
-    """Sag over length and largest tension over weight of a chain between two points of one height."""
+    """Sag over length, largest tension over weight of a chain between points of one height."""
     # Span 1: length = 2 a sinh(1 / (2 a)).
     a = brentq(lambda a: 2.0 * a * math.sinh(0.5 / a) - length_over_span, 0.05, 50.0, xtol=1e-15)
     height = a * math.cosh(0.5 / a)

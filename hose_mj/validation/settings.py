@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,10 @@ STEP_UNIT = 0.02
 """Time steps are this over a whole number, so that they divide the pauses between samples (s)."""
 LARGEST_STEP = STEP_UNIT / 2
 SMALLEST_STEP = 1e-6
+RAW_CLAMPS = (10, 20, 40, 80)
+"""Segments with which MuJoCo's clamp is also run as documented."""
+MOST_UNSTABLE = 10
+"""A chain that is unstable at so many time steps in a row is given up."""
 STAGNATION = 0.15
 """A chain's time step is halved, from the largest stable one on, until a halving takes less than
 this fraction off its error."""
@@ -38,6 +43,11 @@ class Setting:
     timestep: float | None = None
 
     @property
+    def planar(self) -> bool:
+        """Whether a GEDS hose moves in a plane; the hinge chain always does, the cable never."""
+        return self.scheme.endswith(", planar")
+
+    @property
     def label(self) -> str:
         """One line that tells this setting from all others of a case."""
         size = "control points" if self.model == "geds" else "segments"
@@ -47,10 +57,10 @@ class Setting:
 
     def make(self, case: Case, **options: Any) -> HoseModel:
         """Makes the hose of a case, laid into its initial state by the caller."""
-        scheme, _, planar = self.scheme.partition(", ")
+        scheme = self.scheme.removesuffix(", planar")
         options.update(gravity=case.gravity, timestep=self.timestep or 0.005)
         if self.model == "geds":
-            options.update(control_points=self.resolution, plane="xz" if planar else None)
+            options.update(control_points=self.resolution, plane="xz" if self.planar else None)
             options.setdefault("scheme", "bdf2" if self.timestep is None else scheme)
         else:
             options.update(segments=self.resolution, clamp_correction=bool(self.clamp_corrected))
@@ -77,14 +87,18 @@ class Grid:
         static: resolutions of statics and frequencies, by model.
         dynamic: resolutions of motions, by model.
         schemes: integrators of motions, by model.
+        smallest_geds_step: GEDS's time steps end here (s).
         longest_run: a run that would take longer is left out (s).
+        longest_timed_run: a run that took longer is not timed again (s).
         rounds: how often a short run is timed, all models in turn; the least counts.
     """
 
     static: dict[str, tuple[int, ...]]
     dynamic: dict[str, tuple[int, ...]]
     schemes: dict[str, tuple[str, ...]]
+    smallest_geds_step: float
     longest_run: float
+    longest_timed_run: float
     rounds: int
 
 
@@ -105,14 +119,18 @@ FULL = Grid(
         "hinge-chain": (10, 15, 20, 30, 40, 60, 80, 120, 160),
     },
     schemes=_SCHEMES,
+    smallest_geds_step=0.0,
     longest_run=120.0,
+    longest_timed_run=2.0,
     rounds=5,
 )
 QUICK = Grid(
     static={"geds": (8, 12, 20), "cable": (20, 40), "hinge-chain": (20, 40)},
-    dynamic={"geds": (8, 10, 12, 13, 16, 24), "cable": (20, 40), "hinge-chain": (20, 40)},
+    dynamic={"geds": (8, 12, 13, 16, 24), "cable": (20, 40), "hinge-chain": (20, 40)},
     schemes=_SCHEMES,
-    longest_run=4.0,
+    smallest_geds_step=0.9e-3,
+    longest_run=1.5,
+    longest_timed_run=0.6,
     rounds=3,
 )
 
@@ -127,26 +145,40 @@ def list_static(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[Set
 
 
 def list_ladders(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[list[Setting]]:
-    """Yields, for each model, scheme and resolution, the time steps to try, coarse to fine."""
+    """Yields, for each model, scheme and resolution, the time steps to try, coarse to fine.
+
+    Raw clamps are there to be seen, not to win: they run with a model's first scheme alone.
+    """
     for model in models:
         for scheme in grid.schemes[model]:
             for resolution in grid.dynamic[model]:
                 for corrected in _clamps(model, case):
-                    yield [
-                        Setting(model, scheme, resolution, corrected, step)
-                        for step in _steps(model, case)
-                    ]
+                    raw = corrected is False
+                    if raw and (scheme != grid.schemes[model][0] or resolution not in RAW_CLAMPS):
+                        continue
+                    steps = _steps(model, scheme, resolution, case, grid)
+                    yield [Setting(model, scheme, resolution, corrected, step) for step in steps]
 
 
 def _clamps(model: str, case: Case) -> tuple[bool | None, ...]:
     return (None,) if model == "geds" or not case.clamped else (True, False)
 
 
-def _steps(model: str, case: Case) -> list[float]:
-    """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them."""
+def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:
+    """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them.
+
+    An undamped chain with explicit forces need not be tried above twice its limit, known from the
+    highest frequency of a chain of rigid links (docs/mujoco_cable.md).
+    """
     if model == "geds":
-        return list(case.steps)
+        return [step for step in case.steps if step >= grid.smallest_geds_step]
     parts = [2, 3, 4, 5, 6]
     while STEP_UNIT / parts[-1] > SMALLEST_STEP:
         parts.append(2 * parts[-3])
-    return [STEP_UNIT / part for part in parts]
+    steps = [STEP_UNIT / part for part in parts]
+    spec = case.spec
+    if scheme == "discrete" or spec.damping_time > 0.0:
+        return steps
+    segment = spec.length / resolution
+    limit = segment**2 * math.sqrt(spec.linear_density / spec.bending_stiffness / 12.0)
+    return [step for step in steps if step < 2.2 * limit]

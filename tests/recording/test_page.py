@@ -6,6 +6,7 @@ import pytest
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording.page import Page, Picture
+from hose_mj.recording.page_checks import group_checks
 from hose_mj.recording.plots import plot_series
 
 NASTY = "<script>alert('&\"')</script>"
@@ -69,9 +70,21 @@ def test_numbers_are_aligned_right_and_texts_are_not(document):
 def test_checks_have_badges(document):
     badges = [e for e in parse(document).iter("span") if "badge" in e.get("class", "")]
     assert [(e.get("class"), e.text) for e in badges] == [
+        ("badge failed", "failed"),  # once more above all others
         ("badge ok", "ok"),
         ("badge failed", "failed"),
     ]
+
+
+def test_checks_that_share_a_part_of_their_names_stand_together():
+    names = ("rod: a", "rod: b", "drift, x", "drift, y", "m: error", "n: error", "alone, z", "last")
+    groups = group_checks([Check(name, 0.0, 1.0) for name in names])
+    assert {heading: [rest for rest, _ in some] for heading, some in groups.items()} == {
+        "rod": ["a", "b"],
+        "drift": ["x", "y"],
+        "error": ["m", "n"],
+        "Others": ["alone, z", "last"],
+    }
 
 
 def test_running_text_marks_code_and_strong():

@@ -7,8 +7,12 @@ import pytest
 
 from hose_mj.errors import InputError
 from hose_mj.recording import plots
-from hose_mj.recording.palette import COLORS
-from hose_mj.recording.plot_style import spread_apart
+from hose_mj.recording.palette import COLORS, find_model, lighten, name_model
+from hose_mj.recording.plot_labels import Label, label_points, spread_apart
+from hose_mj.recording.plot_parts import format_percent, format_seconds
+from hose_mj.recording.plot_shapes import choose_label_point, choose_size, group_places
+from hose_mj.recording.plot_statics import shade
+from hose_mj.recording.plot_style import make_axes
 
 TIMES = np.linspace(0.0, 1.0, 20)
 MODELS = ("geds", "cable", "flex", "hinge-chain")
@@ -22,13 +26,28 @@ WORK = [
     for n in (10, 20, 40)
     for corrected in ((None,) if model == "geds" else (True, False))
 ]
+GAPS = [plots.Gap(1e-2, "cable", 0.1, 2.0), plots.Gap(1e-3, "hinge-chain", 0.1, 0.5)]
+ERRORS = [
+    plots.ErrorPoint(model, f"\u0393 = {gamma}", n, gamma * (i + 1) / n**2, corrected)
+    for i, model in enumerate(MODELS)
+    for gamma in (1, 2, 3)
+    for n in (10, 20, 40)
+    for corrected in ((None,) if model == "geds" else (True, False))
+]
+SWINGS = {m: np.stack([p, p + np.array([0, 0, 0.3])]) for m, p in SHAPES.items()}
+FANS = [
+    plots.Fan(m, {"\u0393 = 1": SHAPES[m], "\u0393 = 2": 0.5 * SHAPES[m]}, dotted=m != "geds")
+    for m in MODELS
+]
 DRAWINGS = {
-    "work": lambda: plots.plot_work_precision("t", WORK),
+    "work": lambda: plots.plot_work_precision("t", WORK, GAPS),
     "convergence": lambda: plots.plot_convergence("t", "n", CONVERGENCE, slopes=(2,)),
     "shapes": lambda: plots.plot_shapes("t", SHAPES),
-    "series": lambda: plots.plot_series("t", "y", SERIES, limit=2.0),
+    "cost": lambda: plots.plot_convergence("t", "n", CONVERGENCE, (1,), in_seconds=True),
+    "series": lambda: plots.plot_series("t", "y", SERIES, limits={"bound": 2.0}),
     "series-log": lambda: plots.plot_series("t", "y", SERIES, logy=True),
-    "dots": lambda: plots.plot_bars_vs_reference("t", WORK),
+    "statics": lambda: plots.plot_errors("t", ERRORS),
+    "fan": lambda: plots.plot_fan("t", FANS),
 }
 
 
@@ -45,8 +64,13 @@ def test_a_plot_shows_every_model_in_its_colour(kind):
     pixels = read_pixels(png)
     assert np.all(pixels[0] == 1.0)
     for model in MODELS:
-        near = np.all(np.abs(pixels - np.array(COLORS[model]) / 255.0) < 0.02, axis=-1)
-        assert near.sum() > 100, model
+        pale = lighten(COLORS[model], 0.45)  # the lowest of several shapes
+        for color in (COLORS[model], pale if kind == "shapes" else COLORS[model]):
+            near = np.all(np.abs(pixels - np.array(color) / 255.0) < 0.02, axis=-1)
+            if near.sum() > 100:
+                break
+        else:
+            pytest.fail(model)
 
 
 def test_the_same_data_give_the_same_bytes():
@@ -56,16 +80,75 @@ def test_the_same_data_give_the_same_bytes():
 def test_values_that_a_log_axis_cannot_show_do_not_break_it():
     points = [*WORK, plots.WorkPoint("cable", "80", 0.0, 1.0), plots.WorkPoint("x", "1", 1.0, 0.0)]
     plots.plot_work_precision("t", points)
-    plots.plot_bars_vs_reference("t", points)
-    plots.plot_bars_vs_reference("t", [plots.ErrorPoint("geds", "8", 0.0)])
+    plots.plot_errors("t", [plots.ErrorPoint("geds", "", 8, 0.0)])
+    plots.plot_errors("t", [*ERRORS, plots.ErrorPoint("cable", "", 8, 0.0, False)])
     plots.plot_convergence("t", "n", {"geds": ([8, 16], [0.0, 0.0]), "cable": ([8], [0.1])})
     plots.plot_series("t", "y", {"geds": ([0.0, 1.0], [0.0, 0.0])}, logy=True)
     plots.plot_series("t", "y", {"geds": ([0.0], [1.0])})
 
 
 def test_snapshots_fade_and_carry_their_times():
-    swing = {m: np.stack([points, points + np.array([0, 0, 0.3])]) for m, points in SHAPES.items()}
-    assert plots.plot_shapes("t", swing, times=(0.0, 0.5)) != plots.plot_shapes("t", swing)
+    assert plots.plot_shapes("t", SWINGS, times=(0.0, 0.5)) != plots.plot_shapes("t", SWINGS)
+
+
+def test_the_overview_has_the_size_that_the_readme_wants():
+    swings = {m: SWINGS[m] for m in ("geds", "cable")}
+    png = plots.plot_overview(swings, (0.0, 0.5), WORK, GAPS, ("left\nsmall", "right"))
+    pixels = read_pixels(png)
+    assert pixels.shape[:2] == (700, 1600)
+    for model in ("geds", "cable"):
+        near = np.all(np.abs(pixels - np.array(COLORS[model]) / 255.0) < 0.02, axis=-1)
+        assert near.sum() > 100, model
+
+
+def test_a_gap_adds_an_arrow():
+    assert plots.plot_work_precision("t", WORK, GAPS) != plots.plot_work_precision("t", WORK)
+
+
+def test_labels_keep_off_each_other_and_off_the_edge():
+    with make_axes("", (4.0, 3.0)) as (figure, axes):
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        labels = [Label(0.5, 0.5, "12, 2.5 ms", "#000000") for _ in range(40)]
+        n_placed = label_points(figure, axes, [*labels, Label(0.5, 5.0, "out", "#000000")])
+        boxes = [text.get_window_extent() for text in axes.texts]
+    assert 2 <= n_placed == len(boxes) < 40
+    assert all(box.count_overlaps(boxes[:k]) == 0 for k, box in enumerate(boxes))
+
+
+def test_planar_geds_is_a_series_of_its_own():
+    assert find_model("geds planar") == "geds planar"
+    assert find_model("geds, 12 control points, planar") == "geds"
+    assert name_model("cable 20, 1 ms") == "MuJoCo cable 20, 1 ms"
+    assert name_model("midpoint") == "midpoint"
+
+
+def test_shades_run_from_pale_to_dark_through_the_model_colour():
+    shades = [sum(shade("geds", rank, 5)) for rank in range(5)]
+    assert shades == sorted(shades, reverse=True)
+    assert shade("geds", 2, 5) == shade("geds", 0, 1) == COLORS["geds"]
+
+
+def test_figures_of_shapes_follow_the_data():
+    wide, high = (choose_size(np.array([[0, 0], size])) for size in ([4.0, 1.0], [1.0, 4.0]))
+    assert wide[0] > 2.0 * wide[1]
+    assert high[1] > high[0]
+
+
+def test_snapshots_are_labelled_where_they_differ():
+    held = np.zeros((3, 5, 2))
+    held[:, :, 0] = np.linspace(0.0, 1.0, 5)
+    held[:, 2, 1] = (0.0, 1.0, 1.001)
+    assert choose_label_point(held) == 2
+    assert group_places(held[:, 2], 0.02) == [[0], [1, 2]]
+
+
+def test_quantities_have_units_that_suit_them():
+    assert [format_seconds(t) for t in (2.0, 8.3333e-4, 0.0025, 1e-10)] == [
+        *("2 s", "833 \u00b5s", "2.5 ms", "0.1 ns")
+    ]
+    assert format_percent(1e-3) == "0.1 %"
+    assert plots.choose_length_unit(0.02) == ("mm", 1e3)
+    assert plots.choose_length_unit(2.0) == ("m", 1.0)
 
 
 def test_the_pareto_front_has_no_beaten_point():
@@ -93,6 +176,9 @@ def test_labels_are_spread_as_little_as_possible():
         lambda: plots.plot_shapes("t", {"a": np.zeros((3, 2))}),
         lambda: plots.plot_shapes("t", {"a": np.full((3, 3), np.nan)}),
         lambda: plots.plot_series("t", "y", {}),
+        lambda: plots.plot_errors("t", []),
+        lambda: plots.plot_fan("t", []),
+        lambda: plots.plot_overview({}, (), WORK, GAPS, ("", "")),
     ],
 )
 def test_bad_input_is_refused(draw):

@@ -58,11 +58,12 @@ def test_a_recording_reads_back(recording):
             f"/{scene}/series/number/steps": (5, 1),
         }
         for track in ("geds\\,\\ 16", "cable\\,\\ 40\\/x"):
-            expected[f"/{scene}/hoses/{track}"] = (30, 1)
+            expected[f"/{scene}/hoses/{track}"] = (30, 2)
             expected[f"/{scene}/hoses/{track}/ends"] = (30, 1)
     assert rows == expected
     strips = summary["entities"]["/in-space/hoses/geds\\,\\ 16"]["components"]
-    assert strips == ["LineStrips3D:colors", "LineStrips3D:radii", "LineStrips3D:strips"]
+    lines = ["LineStrips3D:colors", "LineStrips3D:radii", "LineStrips3D:strips"]
+    assert strips == [*lines, "Transform3D:translation"]
 
 
 def test_a_recording_is_replaced_whole(recording):
@@ -104,6 +105,19 @@ def test_planar_scenes_are_seen_straight_on_and_whole():
         ahead = ahead / np.linalg.norm(ahead)
         rays = points - framing.eye
         assert np.all(np.abs(rays @ framing.up) < np.tan(np.radians(27.5)) * (rays @ ahead))
+
+
+def test_hoses_at_one_place_are_told_apart():
+    scene = make_scene()
+    framing = compute_framing(scene)
+    radii, shifts = framing.clip_radii(scene), framing.compute_shifts(scene)
+    lowest, upper = (track.name for track in scene.tracks)
+    assert radii[lowest] > radii[upper] > 0.0
+    assert np.allclose(shifts[lowest], 0.0)
+    assert shifts[upper] @ (framing.eye - framing.target) > 0.0
+    assert np.linalg.norm(shifts[upper]) < 0.01 * framing.size
+    deep = make_scene(sideways=0.5)
+    assert not np.any(list(compute_framing(deep).compute_shifts(deep).values()))
 
 
 @pytest.mark.parametrize(("length", "spacing"), [(1.0, 1.0), (0.13, 0.1), (0.5, 0.5), (47.0, 20.0)])

@@ -20,7 +20,7 @@ def make_band(n_control_points: int, dimension: int) -> Array:
 
 @kernel
 def factorize(axes, size, band):  # type: ignore[no-untyped-def]
-    """Replaces the first `size` columns by their Cholesky factor; False at a pivot that is not positive."""
+    """Replaces the first `size` columns by their Cholesky factor; False at a pivot not above 0."""
     width = 4 * len(axes)
     for j in range(size):
         pivot = band[j, 0]

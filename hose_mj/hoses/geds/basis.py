@@ -1,4 +1,4 @@
-"""The cubic B-spline of the hose: knots, basis functions, quadrature tables, mass (thesis A.1-A.3, A.12-A.19).
+"""The cubic B-spline of the hose: knots, basis, quadrature, mass (thesis A.1-A.3, A.12-A.19).
 
 Everything that does not change while a hose moves is computed here, once. Arc length s runs over
 the rest length, [0, L]; n control points make n - 3 spans, and four control points, from number
@@ -24,7 +24,7 @@ class Tables(NamedTuple):
     Attributes:
         first: basis derivatives dN/ds at the Gauss points, (S, 3, 4).
         second: d2N/ds2, (S, 3, 4).
-        products: the outer products of derivatives that a tangent stiffness is made of, (S, 12, 16):
+        products: outer products of derivatives, of which a tangent stiffness is made, (S, 12, 16):
             first x first at each Gauss point, first x second, second x first, second x second.
         weights: Gauss weights that sum to 1, (3,).
         linear: sqrt(3) xi at the Gauss points, xi in [-1, 1]: the linear strain mode, (3,).
@@ -47,7 +47,7 @@ def make_knots(n_control_points: int, length: float) -> Array:
 
 def make_greville(knots: Array) -> Array:
     """Returns the arc lengths at which control points rest on a straight hose, shape (n,)."""
-    return np.minimum((knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0, knots[-1])
+    return np.asarray(np.minimum((knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0, knots[-1]))
 
 
 @compiled
@@ -147,6 +147,6 @@ def make_mass(knots: Array, linear_density: float) -> Array:
 
 
 def interpolate(knots: Array, arc_lengths: Array, points: Array) -> Array:
-    """Returns control points (n, d) of the spline through n points at n arc lengths (thesis A.3)."""
+    """Returns control points (n, d) of the spline through n points at n arc lengths (A.3)."""
     design = BSpline.design_matrix(arc_lengths, knots, DEGREE).toarray()
     return np.asarray(np.linalg.solve(design, points))

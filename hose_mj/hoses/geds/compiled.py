@@ -13,16 +13,18 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numba
 
-_OPTIONS = {
+_OPTIONS: dict[str, Any] = {
     "cache": True,
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "error_model": "numpy",
 }
 compiled = numba.njit(**_OPTIONS)
-kernel = numba.njit(**_OPTIONS, _nrt=False)
+# _nrt=False (no allocation inside) is left out of numba's types.
+kernel = numba.njit(**_OPTIONS, _nrt=False)  # type: ignore[call-overload]
 
 
 @contextmanager

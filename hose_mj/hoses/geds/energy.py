@@ -2,8 +2,8 @@
 
 With a = r', b = r'' (derivatives by rest arc length), A = a.a, B = b.b, C = a.b:
 
-* bending: W = EI/2 |kb|^2 at three Gauss points of each span, kb = a x b / A the curvature vector of
-  the material, |kb|^2 = (A B - C^2) / A^2. No Frenet frame: smooth where the hose is straight.
+* bending: W = EI/2 |kb|^2 at three Gauss points of each span, kb = a x b / A the curvature vector
+  of the material, |kb|^2 = (A B - C^2) / A^2. No Frenet frame: smooth where the hose is straight.
 * stretching: EA h/2 (mean of |a| - 1 over the span)^2. The mean instead of the pointwise strain
   removes membrane locking. In the first and the last span the linear mode of the strain is added;
   without it two axial modes would cost no energy.
@@ -51,7 +51,7 @@ class Span(NamedTuple):
         a, b: r' and r'', (3, 3), Gauss point first.
         a_rate, b_rate: their rates of change, (3, 3).
         force: derivatives of the energy by a and by b, (3, 2, 3).
-        stiffness: its second derivatives for the coordinates (c1, c2), (3, 3, 12): by (a, a), (a, b),
+        stiffness: its second derivatives for coordinates (c1, c2), (3, 3, 12): by (a, a), (a, b),
             (b, a), (b, b) at each Gauss point, in the order of `Tables.products`.
         modes: derivatives of the mean and the linear strain by the control points, (2, 3, 4).
         stretches: |a| and its first two derivatives by A, (3, 3), Gauss point first.
@@ -150,7 +150,7 @@ def _derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped-def]
 
 @kernel
 def compute_strains(axes, tables, elasticity, x, p, strains):  # type: ignore[no-untyped-def]
-    """Writes the mean stretch strain and the linear mode of each span, less the rest strain, (S, 2).
+    """Writes mean stretch strain and linear mode of each span, less the rest strain, (S, 2).
 
     The linear mode is kept at zero but in the first and last span.
     """
@@ -192,7 +192,7 @@ def compute_energy(axes, tables, elasticity, x, p, strains):  # type: ignore[no-
 
 @kernel
 def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped-def]
-    """Sets force and stiffness of Gauss point g to `weight` (EI times length) times the bending terms.
+    """Sets force and stiffness of Gauss point g to `weight` (EI times length) times bending.
 
     `exact` scales the Hessian of |kb|^2 / 2, `viscous` its Gauss-Newton part J^T J with
     J = (1 - t t^T) d kb, the change of kb that a turn of the tangent alone does not explain.
@@ -239,7 +239,7 @@ def _set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped
 
 @kernel
 def _add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
-    """Adds the Kelvin-Voigt force of bending, `weight` (EI tau times length) J^T J (a_rate, b_rate)."""
+    """Adds the viscous force of bending, `weight` (EI tau times length) J^T J (a_rate, b_rate)."""
     a = p.a
     b = p.b
     u = p.a_rate
@@ -281,7 +281,7 @@ def _add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_rest_curvature(g, weight, exact, p):  # type: ignore[no-untyped-def]
-    """Adds `weight` (minus EI kappa_0 times length) times the signed curvature's terms (planar hose)."""
+    """Adds `weight` (minus EI kappa_0 times length) times the signed curvature (planar hose)."""
     a = (p.a[g, 0], p.a[g, 1])
     b = (p.b[g, 0], p.b[g, 1])
     A = a[0] * a[0] + a[1] * a[1]
@@ -307,7 +307,7 @@ def _add_rest_curvature(g, weight, exact, p):  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped-def]
-    """Adds the force of a tension (N) at Gauss point g and, scaled by `exact`, its geometric stiffness."""
+    """Adds force and, scaled by `exact`, geometric stiffness of a tension (N) at Gauss point g."""
     a = p.a
     slope = 2.0 * weight * tension * p.stretches[g, 1]
     unit = 2.0 * weight * exact * tension * p.stretches[g, 1]
@@ -420,7 +420,8 @@ def assemble(axes, tables, elasticity, x, rate, step, exact, p, gradient, band):
 
     Args:
         axes: (0.0,) * d, see compiled.py.
-        tables, elasticity: constants.
+        tables: quadrature tables.
+        elasticity: material constants.
         x: control points, flat, (n d,).
         rate: their velocity, flat; read only where there is damping.
         step: the stage's time step (s); infinite in statics.

@@ -55,7 +55,8 @@ STEPS, ITERATIONS, FALLBACKS = range(3)
 
 def make_state(size: int) -> State:
     """Returns a state of `size` unknowns, all zero."""
-    return State(*(np.zeros(size) for _ in range(5)), np.zeros(1))
+    x, v, x_old, v_old, a = (np.zeros(size) for _ in range(5))
+    return State(x, v, x_old, v_old, a, np.zeros(1))
 
 
 ATTEMPTS = 5
@@ -133,7 +134,7 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
 
 @kernel
 def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
-    """One step; where the scheme's Newton fails, backward Euler with a line search in ever finer parts."""
+    """One step; where its Newton fails, backward Euler with a line search in ever finer parts."""
     careful = Limits(limits.tolerance, 3 * limits.max_iterations, np.inf, True, 0.0)
     verdict = NOT_FINITE
     for attempt in range(ATTEMPTS):

@@ -369,8 +369,10 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
         axes: (0.0,) * d.
         hose: constants.
         stage: (h, X, V).
-        holds: rows; their g is taken at `fraction` of the step.
-        loads: dead loads, scaled by `scale`.
+        holds: rows and what they demand before and after the step.
+        fraction: where in the step that demand is taken, 0 to 1.
+        loads: dead loads.
+        scale: what they are multiplied by.
         limits: when to stop.
         x: flat control points (n d,); the guess on entry.
         work: work arrays; multipliers on return.
@@ -384,7 +386,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
     iteration = 1
     while True:
         build(axes, hose, stage, loads, scale, exact, x, work)
-        # Holds that are not met yet come first: the line search starts from a point that meets them.
+        # Holds not yet met come first: the line search starts from a point that meets them.
         if limits.line_search and exact and iteration > 2 and shortened < 12:
             turned = 0.0
             for k in range(size):

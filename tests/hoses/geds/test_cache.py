@@ -3,8 +3,6 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 PROGRAM = """
 import gc, json
 from numba.core.dispatcher import Dispatcher
@@ -33,7 +31,6 @@ def run(cache):
     return json.loads(done.stdout), done.stderr
 
 
-@pytest.mark.slow
 def test_a_second_process_compiles_nothing(tmp_path):
     (misses, _), said = run(tmp_path)
     assert misses > 0

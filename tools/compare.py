@@ -18,7 +18,7 @@ from hose_mj.errors import InputError
 from tools.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_mj.validation.cases import Case
+    from hose_mj.validation.case import Case
     from hose_mj.validation.compare import Ratio
 
 MODELS = ("geds", "cable", "hinge-chain")

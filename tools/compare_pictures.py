@@ -35,7 +35,7 @@ def draw_all(study: Study) -> Pictures:
     for result in study.results:
         if result.case.motion is not None and result.outcomes:
             pictures.update(_draw_motion(result, study.ratios))
-            if result.case.id == HERO:
+            if result.case.id == HERO and _has_hero_models(result):
                 pictures["overview"] = draw_overview(result, study.ratios)
     for family, members in group_statics(study.results).items():
         pictures.update(_draw_statics(family, members))
@@ -116,6 +116,10 @@ def draw_overview(result: CaseResult, ratios: list[Ratio]) -> bytes:
             "\nbest settings of each model; labels: control points or segments, time step"
         )
     return plots.plot_overview(curves, times, _list_work(result), gaps, (left, right))
+
+
+def _has_hero_models(result: CaseResult) -> bool:
+    return any(outcome.setting.model in ("geds", "cable") for outcome in result.outcomes)
 
 
 def _ratio_of(gap: plots.Gap) -> float:

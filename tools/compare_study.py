@@ -9,7 +9,7 @@ import numpy as np
 
 from hose_mj.checks import Check
 from hose_mj.validation import numerics
-from hose_mj.validation.cases import Case
+from hose_mj.validation.case import Case
 from hose_mj.validation.compare import (
     CaseResult,
     Ratio,

@@ -15,7 +15,8 @@ from hose_mj.checks import Check
 from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.model import Array
 from hose_mj.validation import reference
-from hose_mj.validation.cases import ROD, Case, find_cases
+from hose_mj.validation.case import ROD, Case
+from hose_mj.validation.cases import find_cases
 from hose_mj.validation.modes import compute_frequencies
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import Setting

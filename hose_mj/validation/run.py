@@ -9,7 +9,7 @@ import numpy as np
 
 from hose_mj.errors import StepError
 from hose_mj.hoses.model import Array, HoseModel
-from hose_mj.validation.cases import STIFFENING, Case
+from hose_mj.validation.case import STIFFENING, Case
 from hose_mj.validation.settings import (
     MOST_UNSTABLE,
     STAGNATION,
@@ -209,7 +209,7 @@ def run_ladder(
             why = "unstable" if outcome is None else None
         if why is not None:
             skipped.append(Skipped(case.id, setting, why))
-            if why != "unstable" or len(skipped) == MOST_UNSTABLE:
+            if why != "unstable" or (not outcomes and len(skipped) == MOST_UNSTABLE):
                 break
         if outcome is not None:
             outcomes.append(outcome)
@@ -231,7 +231,7 @@ def _score(case: Case, setting: Setting, reference: Reference) -> Outcome | None
     except StepError:
         return None
     error = _distance(values, reference.values) / case.scale
-    if not error < LOST and setting.model != "geds":
+    if not (error < LOST or (setting.model == "geds" and np.isfinite(error))):
         return None
     return Outcome(
         case.id,

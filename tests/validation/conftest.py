@@ -8,7 +8,7 @@ import pytest
 from hose_mj.errors import StepError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation import settings
-from hose_mj.validation.cases import Case, Motion
+from hose_mj.validation.case import Case, Motion
 from hose_mj.validation.run import Outcome
 from hose_mj.validation.settings import Setting
 

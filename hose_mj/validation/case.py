@@ -1,0 +1,141 @@
+"""What a case is, the hoses that cases use, and how they are laid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+from scipy.special import j0
+
+from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.spec import HoseSpec
+
+LENGTH = 1.0
+BENDING_STIFFNESS = 0.05
+LINEAR_DENSITY = 0.1
+STOUT = HoseSpec(
+    length=LENGTH,
+    axial_stiffness=4e7 * BENDING_STIFFNESS,
+    bending_stiffness=BENDING_STIFFNESS,
+    torsional_stiffness=BENDING_STIFFNESS / 1.3,
+    linear_density=LINEAR_DENSITY,
+)
+"""The hose of the closed forms: EA L^2 / EI = 4e7, as good as inextensible."""
+ROD = replace(STOUT, axial_stiffness=4e5 * BENDING_STIFFNESS)
+"""The hose of the motions: EA L^2 / EI = 4e5."""
+CHAIN = replace(STOUT, axial_stiffness=1e5, bending_stiffness=1e-7, torsional_stiffness=1e-2)
+"""A chain: EI / (w L^3) = 1e-7."""
+STIFFENING = 1e3
+"""EA of the reference for inextensible models, over that of the case."""
+GRAVITY = 9.81
+WEIGHT = LINEAR_DENSITY * GRAVITY * LENGTH
+UNIT_FREQUENCY = math.sqrt(BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**4))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a dynamic case moves.
+
+    Attributes:
+        duration: s.
+        n_samples: instants, evenly spaced and the last at the end, at which models are compared.
+        drive: moves the holds for the end of a step at time t; None where nothing is moved.
+    """
+
+    duration: float
+    n_samples: int
+    drive: Callable[[HoseModel, list[Hold], float], None] | None = None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case.
+
+    Attributes:
+        id: stable; a parameter stands behind the family's name and a dash.
+        family: the id without its parameter.
+        title: one line.
+        about: what is done, what is compared, against what.
+        spec: the hose.
+        gravity: (3,) m/s^2.
+        lay: puts a fresh hose into its initial state and returns its holds.
+        probe: what is compared, (q,); for static cases it finds the equilibrium itself.
+        truth: closed form of the probe, (q,); None where the reference is the converged limit.
+        scale: what errors are a fraction of: None for the reference's own value, else a length (m).
+        motion: None for static cases.
+        clamped: True where one end is clamped, so that a chain's clamp can be corrected.
+        models: the models that the case is run with.
+        steps: time steps of GEDS (s), coarse to fine; dynamic cases only.
+    """
+
+    id: str
+    family: str
+    title: str
+    about: str
+    spec: HoseSpec
+    gravity: tuple[float, float, float]
+    lay: Callable[[HoseModel], list[Hold]]
+    probe: Callable[[HoseModel], Array]
+    truth: Callable[[], Array] | None = None
+    scale: float | None = None
+    motion: Motion | None = None
+    clamped: bool = False
+    models: tuple[str, ...] = ("geds", "cable", "hinge-chain")
+    steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
+
+
+def lay_straight(hose: HoseModel) -> None:
+    """Lays a hose along x from the origin."""
+    hose.reset([[0.0, 0.0, 0.0], [hose.spec.length, 0.0, 0.0]])
+
+
+def lay_cantilever(hose: HoseModel) -> list[Hold]:
+    """A straight hose clamped at the origin."""
+    lay_straight(hose)
+    return [hose.clamp(0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))]
+
+
+def lay_free(hose: HoseModel) -> list[Hold]:
+    """A straight hose that nothing holds."""
+    lay_straight(hose)
+    return []
+
+
+def lay_pinned(hose: HoseModel) -> list[Hold]:
+    """A straight hose attached at the origin."""
+    lay_straight(hose)
+    return [hose.attach(0.0, (0.0, 0.0, 0.0))]
+
+
+def find_tip(hose: HoseModel) -> Array:
+    """Returns the place of the far end (3,), m."""
+    return np.asarray(hose.position(hose.spec.length)[0])
+
+
+@cache
+def _sag(chord: float) -> CubicSpline:
+    """A planar curve of length 1 between two points `chord` apart, by arc length.
+
+    Its angle is -a cos(pi s): no curvature at the ends, where a hinge has no moment, and the chord
+    is the Bessel function J0(a).
+    """
+    a = brentq(lambda a: j0(a) - chord, 1e-6, 2.4)
+    s = np.linspace(0.0, 1.0, 401)
+    angle = -a * np.cos(np.pi * s)
+    slope = CubicSpline(s, np.stack([np.cos(angle), 0.0 * s, np.sin(angle)], axis=1))
+    return slope.antiderivative()
+
+
+def lay_between(hose: HoseModel, span: float) -> list[Hold]:
+    """Lets a hose sag between two attachments of one height."""
+    curve = _sag(span / LENGTH)
+    hose.reset(lambda s: LENGTH * curve(s / LENGTH))
+    return [
+        hose.attach(0.0, (0.0, 0.0, 0.0)),
+        hose.attach(hose.spec.length, (span, 0.0, 0.0)),
+    ]

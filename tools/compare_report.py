@@ -12,8 +12,8 @@ import numpy as np
 from hose_mj.recording.page import Block, Page, Picture, Section
 from hose_mj.recording.palette import name_model
 from hose_mj.recording.plots import format_seconds
-from hose_mj.validation.compare import EQUAL_ERRORS, CaseResult, Ratio, find_cheapest
-from hose_mj.validation.run import Outcome
+from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
+from hose_mj.validation.run import EQUAL_ERRORS, Outcome
 from tools.compare_pictures import (
     HERO,
     Pictures,

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import NullFormatter, NullLocator
 
 from hose_mj.recording.palette import (
     COLORS,
@@ -120,7 +120,7 @@ def _draw_panel(
 def _set_errors(axes: Axes, points: Sequence[ErrorPoint]) -> None:
     """Makes the shared axis logarithmic; raw results that are exact by chance do not stretch it."""
     axes.set_yscale("log")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_locator(NullLocator())
     errors = [p.error for p in points]
     if errors:
         low = min([p.error for p in points if p.clamp_corrected is not False] or errors)

@@ -11,6 +11,7 @@ from hose_mj.checks import Check
 from hose_mj.hoses.model import Array
 from hose_mj.validation.case import Case
 from hose_mj.validation.run import (
+    EQUAL_ERRORS,
     Outcome,
     Reference,
     Skipped,
@@ -21,7 +22,6 @@ from hose_mj.validation.run import (
 )
 from hose_mj.validation.settings import Grid, list_ladders
 
-EQUAL_ERRORS = (0.01, 0.001)
 INEXTENSIBLE = ("cable", "hinge-chain")
 
 
@@ -80,9 +80,9 @@ def run_case(
     advance("reference")
     result = CaseResult(case)
     if "geds" in models:
-        result.stretchable = compute_reference(case, stretchable=True)
+        result.stretchable = compute_reference(case, grid, stretchable=True)
     if set(models) & set(INEXTENSIBLE):
-        result.inextensible = compute_reference(case, stretchable=False)
+        result.inextensible = compute_reference(case, grid, stretchable=False)
     for ladder in list_ladders(case, models, grid):
         advance(f"{ladder[0].model}, {ladder[0].resolution}")
         inextensible = ladder[0].model in INEXTENSIBLE

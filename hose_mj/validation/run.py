@@ -21,6 +21,12 @@ from hose_mj.validation.settings import (
 
 LOST = 0.5
 """An error above this fraction counts as unstable even where no number overflowed."""
+EQUAL_ERRORS = (0.01, 0.001)
+"""Errors at which costs are compared."""
+N_CONTENDERS = 2
+"""Runs of each model that are timed again at each of these errors."""
+REFERENCE_POINTS = 48
+"""Control points of a reference; its uncertainty is its distance from one with three quarters."""
 N_DRAWN = 41
 """Points along the hose that are kept for pictures."""
 
@@ -156,13 +162,13 @@ def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
     return np.array(times), np.array(values), np.array(points), wall
 
 
-def compute_reference(case: Case, *, stretchable: bool, control_points: int = 48) -> Reference:
+def compute_reference(case: Case, grid: Grid, *, stretchable: bool) -> Reference:
     """The converged limit of a motion: GEDS, fine in n, extrapolated in the time step.
 
     Args:
         case: a dynamic case.
+        grid: says how fine in time.
         stretchable: False for the limit of inextensible models (EA times STIFFENING).
-        control_points: of the finer of the two resolutions compared.
     """
     motion = case.motion
     assert motion is not None
@@ -180,9 +186,9 @@ def compute_reference(case: Case, *, stretchable: bool, control_points: int = 48
         return np.asarray((4.0 * runs[1] - runs[0]) / 3.0)
 
     # Damped and driven motions are smooth in time; the free ones ring.
-    parts = 256 if motion.drive is None else 64
-    fine = extrapolate(control_points, parts)
-    coarse = extrapolate(3 * control_points // 4, parts // 2)
+    parts = grid.reference_steps[motion.drive is not None] // 2
+    fine = extrapolate(REFERENCE_POINTS, parts)
+    coarse = extrapolate(3 * REFERENCE_POINTS // 4, parts // 2)
     assert case.scale is not None
     return Reference(fine, _distance(fine, coarse) / case.scale)
 
@@ -195,7 +201,7 @@ def run_ladder(
     skipped: list[Skipped] = []
     for setting in ladder:
         if setting.model != "geds" and outcomes:
-            if _is_exhausted(outcomes):
+            if _is_exhausted(outcomes) or len(outcomes) == grid.longest_ladder:
                 break
             last = outcomes[-1].setting.timestep
             assert setting.timestep is not None
@@ -264,21 +270,25 @@ def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:
 
 def time_rounds(case: Case, outcomes: list[Outcome], grid: Grid) -> None:
     """Times the runs that could be cheapest again, unread, all models in turn; the least counts."""
-    contenders = [outcome for outcome in outcomes if _contends(outcome, outcomes)]
+    contenders = [
+        outcome
+        for kind in dict.fromkeys(map(_kind, outcomes))
+        for at_error in EQUAL_ERRORS
+        for outcome in _find_fastest(outcomes, kind, at_error)
+    ]
+    contenders = list({id(outcome): outcome for outcome in contenders}.values())
     for _ in range(grid.rounds):
         for outcome in contenders:
             if outcome.wall_s < grid.longest_timed_run:
                 outcome.wall_s = min(outcome.wall_s, time_run(case, outcome.setting.make(case)))
 
 
-def _contends(outcome: Outcome, outcomes: list[Outcome]) -> bool:
-    """False if another run of the same kind is better and takes less than half the time."""
-    kind = _kind(outcome)
-    return not any(
-        other.error <= outcome.error and other.wall_s < 0.5 * outcome.wall_s
-        for other in outcomes
-        if _kind(other) == kind
-    )
+def _find_fastest(
+    outcomes: list[Outcome], kind: tuple[str, bool, bool], at_error: float
+) -> list[Outcome]:
+    """The few fastest of one kind with at most this error, as first timed."""
+    fits = [o for o in outcomes if _kind(o) == kind and o.error <= at_error]
+    return sorted(fits, key=lambda outcome: outcome.wall_s)[:N_CONTENDERS]
 
 
 def _kind(outcome: Outcome) -> tuple[str, bool, bool]:

@@ -141,14 +141,14 @@ def test_simulate_samples_evenly_and_drives_to_the_end_of_every_step(case, fake)
 
 def test_the_reference_is_extrapolated_in_the_time_step(case, fake):
     fake.error = staticmethod(lambda step, n: 0.25 + 3.0 * step**2)
-    reference = compute_reference(case, stretchable=True)
+    reference = compute_reference(case, QUICK, stretchable=True)
     np.testing.assert_allclose(reference.values[1:, 2], 0.25, rtol=1e-12)
     assert reference.uncertainty < 1e-12
 
 
 def test_the_uncertainty_of_a_reference_is_what_its_two_resolutions_differ_by(case, fake):
     fake.error = staticmethod(lambda step, n: 0.01 * (n == 36))
-    reference = compute_reference(case, stretchable=False)
+    reference = compute_reference(case, QUICK, stretchable=False)
     assert reference.uncertainty == pytest.approx(0.01)
     assert {hose.resolution for hose in fake.made} == {36, 48}
     assert {hose.spec.axial_stiffness for hose in fake.made} == {1e3 * case.spec.axial_stiffness}

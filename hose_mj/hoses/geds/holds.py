@@ -27,6 +27,7 @@ class _Held:
     position: Array  # (3,)
     tangent: Array | None  # (3,), unit
     multipliers: Array  # (d,) or (2 d - 1,)
+    first: int = 0  # its first row of G x = g
 
 
 class HoldSet:
@@ -104,7 +105,10 @@ class HoldSet:
         point = held.position if position is None else self._spline.check_position(position)
         aim = held.tangent if tangent is None else self._spline.check_direction(tangent)
         held.position, held.tangent = point, aim
-        self._rebuild(x)
+        if tangent is None:
+            self._aim(held, x)
+        else:
+            self._rebuild(x)
 
     def release(self, hold: Hold, x: Array) -> None:
         """Drops one hold; raises `InputError` for one that is not here."""
@@ -193,9 +197,18 @@ class HoldSet:
             after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
             multipliers[own] = held.multipliers
             # A view: what the kernels write belongs to the hold.
-            held.multipliers = multipliers[own]
+            held.multipliers, held.first = multipliers[own], first
             first = own.stop
         self.rows = solver.Holds(start, coefficients, before, after, multipliers)
+
+    def _aim(self, held: _Held, x: Array) -> None:
+        """What `_rebuild` does for a hold of which only the position has changed."""
+        d, rows = self._spline.dimension, self.rows
+        own = slice(held.first, held.first + len(held.multipliers))
+        window = slice(rows.start[held.first], rows.start[held.first] + 4 * d)
+        rows.before[own] = rows.rows[own] @ x[window]
+        wanted = (held.position - self._spline.offset)[self._spline.dims]
+        rows.after[held.first : held.first + d] = wanted
 
     def _make_rows(self, held: _Held, values: Array) -> Array:
         """Coefficients of one hold's rows from the basis there (3, 4): (d or 2 d - 1, 4 d)."""

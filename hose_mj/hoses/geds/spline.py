@@ -6,6 +6,8 @@ class knows which world axes those are and how far the plane lies from the origi
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -65,7 +67,7 @@ class Spline:
         """Unknowns of the hose, n d."""
         return self.n_control_points * self.dimension
 
-    @property
+    @cached_property
     def normal(self) -> Array:
         """Unit normal (3,) of a planar hose: positive moments about it turn dims[0] to dims[1]."""
         unit = np.eye(3)

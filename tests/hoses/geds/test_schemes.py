@@ -91,9 +91,9 @@ def test_damping_inside_a_plane_keeps_momentum(make_hose):
     assert hose.energies().total < 0.9 * undamped.energies().total
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
-def test_energy_of_a_released_rod_never_rises_above_its_start(make_hose, tolerance):
-    hose = make_hose(plane="xz", timestep=0.005, tolerance=tolerance)
+@pytest.mark.parametrize("options", [{}, {"tolerance": 1e-4}, {"tolerance": 1e-6}])
+def test_energy_of_a_released_rod_never_rises_above_its_start(make_hose, options):
+    hose = make_hose(plane="xz", timestep=0.005, **options)
     hose.clamp(0.0)
     totals, heights = [], []
     for _ in range(2000):

@@ -29,7 +29,7 @@ from hose_mj.validation.settings import MOST_UNSTABLE, QUICK, STAGNATION, Settin
 
 PARTS = sorted(k * 2**power for power in range(12) for k in (2, 3, 5))
 """Time steps are 20 ms over these; all halves are among them."""
-GRID = replace(QUICK, longest_run=60.0, rounds=2)
+GRID = replace(QUICK, longest_ladder=20, longest_run=60.0, rounds=2)
 
 
 def run(case, model, grid=GRID):
@@ -67,6 +67,12 @@ def test_a_chain_goes_on_while_halving_helps(case, fake):
     gains = 1.0 - errors[1:] / errors[:-1]
     assert np.all(gains[:-1] >= STAGNATION)
     assert gains[-1] < STAGNATION
+
+
+def test_a_ladder_is_no_longer_than_its_grid_allows(case, fake):
+    fake.error = staticmethod(lambda step, n: 10.0 * step**2)
+    _, outcomes, _ = run(case, "cable", replace(GRID, longest_ladder=3))
+    assert len(outcomes) == 3
 
 
 def test_a_chain_that_is_far_off_counts_as_unstable(case, fake):

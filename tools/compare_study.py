@@ -22,7 +22,7 @@ from hose_mj.validation.run import Outcome, Skipped
 from hose_mj.validation.settings import FULL, QUICK
 
 N_RANDOM_STATES = 100_000
-N_RANDOM_STATES_QUICK = 1_000
+N_RANDOM_STATES_QUICK = 500
 
 
 @dataclass

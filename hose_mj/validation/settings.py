@@ -132,11 +132,11 @@ FULL = Grid(
 )
 QUICK = Grid(
     static={"geds": (8, 12, 20), "cable": (20, 40), "hinge-chain": (20,)},
-    dynamic={"geds": (8, 12, 13, 20), "cable": (20, 40), "hinge-chain": (20, 40)},
+    dynamic={"geds": (8, 12, 13, 16), "cable": (20, 40), "hinge-chain": (20, 40)},
     schemes=_SCHEMES | {"hinge-chain": ("euler", "rk4")},
     smallest_geds_step=0.9e-3,
     longest_ladder=3,
-    longest_run=1.0,
+    longest_run=1.3,
     longest_timed_run=0.6,
     rounds=2,
     reference_steps=(256, 64),

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.model import Array, HoseModel
-from hose_mj.validation.case import STIFFENING, Case
+from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.validation.case import STIFFENING, Case, Motion
 from hose_mj.validation.settings import (
     MOST_UNSTABLE,
     STAGNATION,
     Grid,
     Setting,
-    list_ladders,
     list_static,
 )
 
@@ -147,15 +146,7 @@ def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
     times, values, points = [0.0], [case.probe(hose)], [hose.position(drawn)]
     wall = 0.0
     for sample in range(1, motion.n_samples + 1):
-        start = time.perf_counter()
-        if motion.drive is None:
-            hose.step(n_steps)
-        else:
-            begun = (sample - 1) * n_steps
-            for step in range(begun + 1, begun + n_steps + 1):
-                motion.drive(hose, holds, step * hose.timestep)
-                hose.step(1)
-        wall += time.perf_counter() - start
+        wall += _advance(motion, hose, holds, (sample - 1) * n_steps, n_steps)
         times.append(sample * pause)
         values.append(case.probe(hose))
         points.append(hose.position(drawn))
@@ -301,12 +292,17 @@ def time_run(case: Case, hose: HoseModel) -> float:
     assert case.motion is not None
     holds = case.lay(hose)
     n_steps = round(case.motion.duration / hose.timestep)
+    return _advance(case.motion, hose, holds, 0, n_steps)
+
+
+def _advance(motion: Motion, hose: HoseModel, holds: list[Hold], begun: int, n_steps: int) -> float:
+    """Takes n_steps steps after the `begun` first, holds moved; returns the wall time (s)."""
     start = time.perf_counter()
-    if case.motion.drive is None:
+    if motion.drive is None:
         hose.step(n_steps)
     else:
-        for step in range(1, n_steps + 1):
-            case.motion.drive(hose, holds, step * hose.timestep)
+        for step in range(begun + 1, begun + n_steps + 1):
+            motion.drive(hose, holds, step * hose.timestep)
             hose.step(1)
     return time.perf_counter() - start
 
@@ -323,17 +319,3 @@ def _distance(values: Array, reference: Array) -> float:
     """Largest distance between two motions' points, (k, 3 p) each (m)."""
     gap = (values - reference).reshape(len(values), -1, 3)
     return float(np.max(np.linalg.norm(gap, axis=2)))
-
-
-__all__ = [
-    "Outcome",
-    "Reference",
-    "Skipped",
-    "compute_reference",
-    "list_ladders",
-    "run_ladder",
-    "run_static",
-    "simulate",
-    "time_rounds",
-    "time_run",
-]

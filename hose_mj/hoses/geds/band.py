@@ -10,12 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.hoses.geds.compiled import kernel
-from hose_mj.hoses.model import Array
-
-
-def make_band(n_control_points: int, dimension: int) -> Array:
-    """Returns an empty band for n control points with `dimension` unknowns each."""
-    return np.zeros((n_control_points * dimension + 4 * dimension, 8 * dimension))
 
 
 @kernel

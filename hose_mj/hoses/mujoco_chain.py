@@ -54,9 +54,12 @@ class MujocoChainHose:
     """
 
     def __init__(self, spec: HoseSpec, kind: ChainKind, settings: ChainSettings) -> None:
-        for name in ("rest_strain", "rest_curvature", "drag"):
+        for name in ("rest_strain", "rest_curvature", "rest_torsion", "drag"):
             if getattr(spec, name) != 0.0:
                 raise InputError(name, getattr(spec, name), f"0 for a {type(self).__name__}")
+        if spec.fittings or not spec.is_isotropic:
+            name = "fittings" if spec.fittings else "second_bending_stiffness"
+            raise InputError(name, getattr(spec, name), f"none for a {type(self).__name__}")
         self.spec, self.settings, self.fallbacks = spec, settings, 0
         self._kind = kind
         self._next_number = 0

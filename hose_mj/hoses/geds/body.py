@@ -34,7 +34,7 @@ class SplineBody:
     """
 
     def __init__(self, spec: HoseSpec, spline: Spline, gravity: ArrayLike) -> None:
-        _check_rest_curvature(spec, spline.plane)
+        _check_supported(spec, spline.plane)
         self.spec = spec
         self.gravity = check_vector("gravity", gravity).copy()
         spline.check_in_plane("gravity", self.gravity, 0.0)
@@ -147,7 +147,12 @@ class SplineBody:
         )
 
 
-def _check_rest_curvature(spec: HoseSpec, plane: str | None) -> None:
+def _check_supported(spec: HoseSpec, plane: str | None) -> None:
     if plane is None and spec.rest_curvature != 0.0:
         valid = "0 for a hose in space (a signed rest curvature needs plane='xy', 'xz' or 'yz')"
         raise InputError("rest_curvature", spec.rest_curvature, valid)
+    if spec.second_bending_stiffness not in (None, spec.bending_stiffness):
+        raise InputError("second_bending_stiffness", spec.second_bending_stiffness, "None")
+    if spec.rest_torsion != 0.0 or spec.fittings:
+        name = "rest_torsion" if spec.rest_torsion != 0.0 else "fittings"
+        raise InputError(name, getattr(spec, name), "none for this model")

@@ -32,6 +32,35 @@ def factorize(axes, size, band):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def factorize_indefinite(axes, size, band, signs):  # type: ignore[no-untyped-def]
+    """Replaces the first `size` columns by L of L S L^T, S = diag(signs), signs 1 or -1.
+
+    Returns the number of negative pivots, -1 at a pivot that is as good as zero or no number. There
+    is no exchange of rows, so a matrix that is not positive definite may lose accuracy.
+    """
+    width = 4 * len(axes)
+    n_negative = 0
+    for j in range(size):
+        pivot = band[j, 0]
+        if not abs(pivot) > 1e-300:
+            return -1
+        sign = 1.0
+        if pivot < 0.0:
+            sign = -1.0
+            n_negative += 1
+        signs[j] = sign
+        inverse = 1.0 / np.sqrt(sign * pivot)
+        for k in range(width):
+            band[j, k] *= sign * inverse
+        for k in range(1, width):
+            factor = sign * band[j, k]
+            for m in range(width):
+                band[j + k, m] -= factor * band[j, k + m]
+        band[j, 0] = inverse
+    return n_negative
+
+
+@kernel
 def solve_lower(axes, size, band, rows):  # type: ignore[no-untyped-def]
     """Solves L y = rhs in place for every row of `rows` (m, size + 4 d), zero after `size`.
 

@@ -16,26 +16,37 @@ from hose_mj.hoses.geds.compiled import compiled
 from hose_mj.hoses.model import Array
 
 DEGREE = 3
+MASS_WEIGHTS = np.polynomial.legendre.leggauss(4)[1] / 2.0
+"""Weights of the mass matrix's Gauss points, as fractions of a span."""
 
 
 class Tables(NamedTuple):
     """Quadrature tables of the strain energy: three Gauss points on each of S spans.
 
     Attributes:
+        value: basis N at the Gauss points, (S, 3, 4).
         first: basis derivatives dN/ds at the Gauss points, (S, 3, 4).
         second: d2N/ds2, (S, 3, 4).
+        ends: dN/ds at the end of each span, (S, 4).
         products: outer products of derivatives, of which a tangent stiffness is made, (S, 12, 16):
             first x first at each Gauss point, first x second, second x first, second x second.
+        turn_products: the same for theta with the place, first x first, value x first, value x
+            second, and for theta with itself, first x first, value x value, (S, 15, 16).
         weights: Gauss weights that sum to 1, (3,).
         linear: sqrt(3) xi at the Gauss points, xi in [-1, 1]: the linear strain mode, (3,).
+        gaps: distance of each Gauss point from the one before it, in span lengths, (3,).
         span_length: L / S (m).
     """
 
+    value: Array
     first: Array
     second: Array
+    ends: Array
     products: Array
+    turn_products: Array
     weights: Array
     linear: Array
+    gaps: Array
     span_length: float
 
 
@@ -116,28 +127,56 @@ def make_tables(knots: Array) -> Tables:
     span_length = float(knots[-1]) / n_spans
     at = (np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span_length
     _, values = compute_basis(knots, at.ravel())
-    first = np.ascontiguousarray(values[:, 1].reshape(n_spans, 3, 4))
-    second = np.ascontiguousarray(values[:, 2].reshape(n_spans, 3, 4))
-    products = np.empty((n_spans, 12, 16))
-    for row, (left, right) in enumerate(
-        [(first, first), (first, second), (second, first), (second, second)]
-    ):
-        outer = np.einsum("sgi,sgj->sgij", left, right)
-        products[:, 3 * row : 3 * row + 3] = outer.reshape(n_spans, 3, 16)
-    return Tables(first, second, products, weights / 2.0, np.sqrt(3.0) * nodes, span_length)
+    value, first, second = (
+        np.ascontiguousarray(values[:, k].reshape(n_spans, 3, 4)) for k in range(3)
+    )
+    return Tables(
+        value,
+        first,
+        second,
+        _compute_end_slopes(knots),
+        _multiply(first, first, first, second, second, first, second, second),
+        _multiply(first, first, value, first, value, second, first, first, value, value),
+        weights / 2.0,
+        np.sqrt(3.0) * nodes,
+        np.array([1.0 - nodes[2], 0.5 * nodes[2], 0.5 * nodes[2]]),
+        span_length,
+    )
 
 
-def make_mass(knots: Array, linear_density: float) -> Array:
+def _multiply(*factors: Array) -> Array:
+    """Returns outer products of pairs of basis rows at the Gauss points, (S, 3 pairs, 16)."""
+    n_spans = len(factors[0])
+    outer = [
+        np.einsum("sgi,sgj->sgij", left, right).reshape(n_spans, 3, 16)
+        for left, right in zip(factors[::2], factors[1::2], strict=True)
+    ]
+    return np.concatenate(outer, axis=1)
+
+
+def _compute_end_slopes(knots: Array) -> Array:
+    """Returns dN/ds of a span's four basis functions at its end, (S, 4)."""
+    n_spans = len(knots) - 2 * DEGREE - 1
+    spans, values = compute_basis(knots, knots[DEGREE + 1 : -DEGREE])
+    slopes = np.zeros((n_spans, 4))
+    for e, (span, slope) in enumerate(zip(spans, values[:, 1], strict=True)):
+        # A knot may count to the span that begins there, whose last basis function is 0 there.
+        slopes[e, span - e :] = slope[: 4 - (span - e)]
+    return slopes
+
+
+def make_mass(knots: Array, linear_density: Array) -> Array:
     """Returns the constant mass matrix of thesis A.18 per coordinate, as a lower band (n, 4).
 
-    Entry (j, k) couples control points j + k and j; four Gauss points integrate it exactly.
+    Entry (j, k) couples control points j + k and j; four Gauss points a span, at which the linear
+    density (S, 4) kg/m is given, integrate that of a uniform hose exactly.
     """
     n_spans = len(knots) - 2 * DEGREE - 1
-    nodes, weights = np.polynomial.legendre.leggauss(4)
+    nodes = np.polynomial.legendre.leggauss(4)[0]
     span_length = float(knots[-1]) / n_spans
     at = (np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span_length
     spans, values = compute_basis(knots, at.ravel())
-    scale = linear_density * 0.5 * span_length * np.tile(weights, n_spans)
+    scale = (linear_density * MASS_WEIGHTS * span_length).ravel()
     mass = np.zeros((n_spans + DEGREE, 4))
     for span, basis, weight in zip(spans, values[:, 0], scale, strict=True):
         for j in range(4):

@@ -1,17 +1,18 @@
 """`SplineBody`: the matter and the state of one hose, and all that can be asked of them.
 
-It knows nothing of holds, loads or time steps; `GedsHose` adds those.
+It knows nothing of loads or time steps; `GedsHose` adds those.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, mechanics, schemes
+from hose_mj.hoses.geds.compiled import run_kernel
+from hose_mj.hoses.geds.holds import HoldSet
+from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_arc_lengths, check_vector, sample_curve, sample_velocity
 from hose_mj.hoses.model import Array, Curve, Energies, Momentum
@@ -19,7 +20,7 @@ from hose_mj.hoses.spec import HoseSpec
 
 
 class SplineBody:
-    """A hose as control points and their velocities.
+    """A hose as control points, their velocities and what holds them.
 
     Args:
         spec: the hose.
@@ -30,21 +31,21 @@ class SplineBody:
         spec, gravity: as given.
 
     Raises:
-        InputError: gravity out of the plane, a rest curvature in space.
+        InputError: gravity out of the plane.
     """
 
     def __init__(self, spec: HoseSpec, spline: Spline, gravity: ArrayLike) -> None:
-        _check_supported(spec, spline.plane)
         self.spec = spec
         self.gravity = check_vector("gravity", gravity).copy()
         spline.check_in_plane("gravity", self.gravity, 0.0)
         self._spline = spline
         self._axes = spline.axes
         self._hose = mechanics.make_constants(spec, spline.knots)
-        uniform = np.tile(self.gravity[spline.dims], spline.n_control_points)
+        uniform = spline.from_world(np.tile(self.gravity, (spline.n_control_points, 1)))
         self._weight = self._multiply_mass(uniform)
         self._state = schemes.make_state(spline.size)
-        self._span = energy.make_span()
+        self._holds = HoldSet(spline, self._hose)
+        self._span = make_span()
         self._strains = np.zeros((spline.n_control_points - 3, 2))
 
     @property
@@ -73,9 +74,13 @@ class SplineBody:
     def tension(self, arc_length: ArrayLike) -> Array:
         """Axial force, shape (k,), N: linear between the means of the spans' middles."""
         s = check_arc_lengths(arc_length, self.spec.length)
-        self._run_on_strains(energy.compute_strains)
-        stiffness = self.spec.axial_stiffness
-        return mechanics.interpolate_tension(self._strains, stiffness, self.spec.length, s)
+        hose = self._hose
+        run_kernel(
+            *(energy.compute_strains, self._axes, hose.tables, hose.elasticity),
+            *(self._state.x, self._span, self._strains),
+        )
+        stiffness = hose.elasticity.axial_stiffness[:, None]
+        return mechanics.interpolate_tension(stiffness * self._strains, self.spec.length, s)
 
     def curvature(self, arc_length: ArrayLike) -> Array:
         """Material curvature |r' x r''| / |r'|^2, shape (k,), 1/m."""
@@ -84,13 +89,35 @@ class SplineBody:
         squares = np.maximum(np.sum(a * a, axis=1), 1e-12)
         return np.asarray(np.linalg.norm(np.cross(a, b), axis=1) / squares)
 
+    def twist(self, arc_length: ArrayLike) -> Array:
+        """Turn of the material about the tangent per rest length (k,), rad/m, beyond its rest.
+
+        What remains of it when the hose is bent without being turned is zero (thesis A.9's
+        twisting strain, without its Frenet frame).
+        """
+        s = check_arc_lengths(arc_length, self.spec.length)
+        return mechanics.compute_twist(
+            self._spline, self._hose, self._holds.rows.twist, s, self._state.x
+        )
+
+    def torque(self, arc_length: ArrayLike) -> Array:
+        """Moment about the tangent (k,), N m, positive where the far side turns right-handed."""
+        s = check_arc_lengths(arc_length, self.spec.length)
+        stiffness = mechanics.find_torsional_stiffness(self._hose, s)
+        return np.asarray(stiffness * self.twist(s))
+
     def energies(self) -> Energies:
         """Energies at the present state (thesis A.10, A.15)."""
-        stretching, bending = self._run_on_strains(energy.compute_energy)
+        hose, twist = self._hose, self._holds.rows.twist
+        stretching, bending, twisting = run_kernel(
+            *(energy.compute_energy, self._axes, hose.tables, hose.elasticity, twist.frames),
+            *(self._state.x, self._span, self._strains),
+        )
+        twisting += 0.5 * float(np.sum(twist.angle**2 / twist.compliance))
         kinetic = 0.5 * float(self._state.v @ self._multiply_mass(self._state.v))
         # The offset of a planar hose is normal to gravity.
         gravitational = -float(self._state.x @ self._weight)
-        return Energies(kinetic, float(stretching), float(bending), 0.0, gravitational)
+        return Energies(kinetic, float(stretching), float(bending), float(twisting), gravitational)
 
     def momentum(self) -> Momentum:
         """Linear and angular momentum about the world's origin."""
@@ -112,6 +139,8 @@ class SplineBody:
         offset = self._spline.find_offset(points)
         state = schemes.make_state(self._spline.size)
         state.x[:] = self._spline.interpolate(arc_lengths, points)
+        if self._spline.has_theta:
+            state.x[3::4] = self.spec.rest_torsion * arc_lengths
         if velocity is not None:
             speeds = sample_velocity(velocity, self.spec.length, arc_lengths)
             for speed in speeds:
@@ -131,7 +160,7 @@ class SplineBody:
             raise InputError("shape of the control points", wanted.shape, valid)
         self._spline.offset = self._spline.find_offset(wanted)
         self._state = schemes.make_state(self._spline.size)
-        self._state.x[:] = wanted[:, self._spline.dims].ravel()
+        self._state.x[:] = self._spline.from_world(wanted)
 
     def _evaluate(self, arc_length: ArrayLike, flat: Array, derivative: int = 0) -> Array:
         s = check_arc_lengths(arc_length, self.spec.length)
@@ -139,20 +168,3 @@ class SplineBody:
 
     def _multiply_mass(self, flat: Array) -> Array:
         return mechanics.multiply_mass(self._axes, self._hose, flat)
-
-    def _run_on_strains(self, kernel: Any) -> Any:
-        hose, x = self._hose, self._state.x
-        return mechanics.run_kernel(
-            *(kernel, self._axes, hose.tables, hose.elasticity, x, self._span, self._strains)
-        )
-
-
-def _check_supported(spec: HoseSpec, plane: str | None) -> None:
-    if plane is None and spec.rest_curvature != 0.0:
-        valid = "0 for a hose in space (a signed rest curvature needs plane='xy', 'xz' or 'yz')"
-        raise InputError("rest_curvature", spec.rest_curvature, valid)
-    if spec.second_bending_stiffness not in (None, spec.bending_stiffness):
-        raise InputError("second_bending_stiffness", spec.second_bending_stiffness, "None")
-    if spec.rest_torsion != 0.0 or spec.fittings:
-        name = "rest_torsion" if spec.rest_torsion != 0.0 else "fittings"
-        raise InputError(name, getattr(spec, name), "none for this model")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -38,3 +38,17 @@ def compile_notice(what: str) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+_called: set[tuple[Callable[..., Any], int]] = set()
+
+
+def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
+    """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
+    version = (kernel, len(axes))
+    if version in _called:
+        return kernel(axes, *arguments)
+    with compile_notice("GEDS kernels"):
+        result = kernel(axes, *arguments)
+    _called.add(version)
+    return result

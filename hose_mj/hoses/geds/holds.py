@@ -2,7 +2,9 @@
 
 An attachment is d rows, r(s) = position. A clamp has d - 1 more, r'(s) . e = 0 for unit vectors e
 across the wanted tangent: the hose may stretch through it, but not turn. The rows' multipliers are
-the forces that a hold does to the hose, in space and on r'.
+the forces that a hold does to the hose, in space and on r'. In space a clamp also holds the angle
+of the material about the tangent: by a row for theta where there is one, else by the twist of the
+stretch to the next clamp (stretches.py).
 """
 
 from __future__ import annotations
@@ -14,9 +16,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import solver
+from hose_mj.hoses.geds import solver, stretches
+from hose_mj.hoses.geds.compiled import run_kernel
+from hose_mj.hoses.geds.frames import lay_frames
+from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.twist import Twist
 from hose_mj.hoses.model import Array, Hold, Reaction
+from hose_mj.hoses.spec import check_number
+
+_REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "kept")
+"""What of the twist goes into a snapshot."""
 
 
 @dataclass
@@ -26,7 +36,7 @@ class _Held:
     hold: Hold
     position: Array  # (3,)
     tangent: Array | None  # (3,), unit
-    multipliers: Array  # (d,) or (2 d - 1,)
+    multipliers: Array  # (d,) or (2 d - 1,), one more with theta
     first: int = 0  # its first row of G x = g
 
 
@@ -35,30 +45,43 @@ class HoldSet:
 
     Args:
         spline: the hose's geometry.
+        hose: its constants.
 
     Attributes:
         rows: what the kernels read and write; made anew by every change.
     """
 
-    def __init__(self, spline: Spline) -> None:
-        self._spline = spline
+    def __init__(self, spline: Spline, hose: solver.Hose) -> None:
+        self._spline, self._hose = spline, hose
         self._held: list[_Held] = []
+        self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
         self._n_made = 0
-        self.rows = solver.Holds(
-            np.zeros(0, dtype=np.int64),
-            np.zeros((0, 4 * spline.dimension)),
-            *(np.zeros(0) for _ in range(3)),
-        )
+        x = np.zeros(spline.size)
+        self.rows = self._make_rows_of_all(x, stretches.make_twist(spline, hose, [], x))
 
     @property
     def n_rows(self) -> int:
-        """Rows of G."""
-        return len(self.rows.start)
+        """Rows of G, and of the twist between clamps."""
+        return len(self.rows.start) + len(self.rows.twist.angle)
 
-    def clear(self, x: Array) -> None:
-        """Drops all holds; their numbers are not used again."""
-        self._held = []
-        self._rebuild(x)
+    def clear(self, x: Array, director: Array | None = None) -> None:
+        """Drops all holds; their numbers are not used again. The material's frames begin anew.
+
+        Args:
+            x: the unknowns.
+            director: of the material where the hose begins, (3,); any by default.
+        """
+        self._held, self._clamps = [], []
+        twist = stretches.make_twist(self._spline, self._hose, [], x)
+        if self._spline.has_theta:
+            start = stretches.make_directors(self._spline, np.zeros(1), x)[0]
+            seed = start[3:] if director is None else director
+            first = stretches.find_first_tangent(self._spline, self._hose, x)
+            twist.frames[0, 6:9] = stretches.carry_director(start[:3], first, seed)
+            axes, tables = self._spline.axes, self._hose.tables
+            run_kernel(lay_frames, axes, tables, twist, x, make_span(), twist.frames)
+            twist.kept[:] = twist.frames
+        self.rows = self._make_rows_of_all(x, twist)
 
     def add(
         self, arc_length: float, position: ArrayLike | None, tangent: Array | None, x: Array
@@ -69,7 +92,7 @@ class HoldSet:
             arc_length: where on the hose (m).
             position: wanted place (3,) m; None for where the hose is now.
             tangent: wanted unit tangent (3,) of a clamp; None for an attachment.
-            x: the hose's control points, (n d,).
+            x: the hose's unknowns.
 
         Raises:
             InputError: a place off the hose or that another hold is at, a position off its plane.
@@ -84,22 +107,32 @@ class HoldSet:
         else:
             point = spline.check_position(position)
         hold = Hold(self._n_made, s, tangent is not None)
-        n_rows = spline.dimension if tangent is None else 2 * spline.dimension - 1
+        n_rows = spline.dimension
+        if tangent is not None:
+            n_rows += spline.dimension - 1 + spline.has_theta
         self._n_made += 1
         self._held.append(_Held(hold, point, tangent, np.zeros(n_rows)))
         self._rebuild(x)
         return hold
 
     def move(
-        self, hold: Hold, position: ArrayLike | None, tangent: ArrayLike | None, x: Array
+        self,
+        hold: Hold,
+        position: ArrayLike | None,
+        tangent: ArrayLike | None,
+        spin: float,
+        x: Array,
     ) -> None:
         """Sets where a hold is to be at the end of the next step; see `HoseModel.move`.
 
         Raises:
-            InputError: a hold that is not here, a vector out of the plane, a tangent for an
-                attachment; nothing has changed then.
+            InputError: a hold that is not here, a vector out of the plane, a tangent or a spin for
+                an attachment, a spin in a plane; nothing has changed then.
         """
         held = self._find(hold)
+        check_number("spin", spin, may_be_negative=True)
+        if spin != 0.0 and (held.tangent is None or self._spline.dimension == 2):
+            raise InputError("spin", spin, "0 for an attachment and for a hose in a plane")
         if tangent is not None and held.tangent is None:
             raise InputError("tangent", tangent, "None for an attachment (use clamp)")
         point = held.position if position is None else self._spline.check_position(position)
@@ -109,6 +142,8 @@ class HoldSet:
             self._aim(held, x)
         else:
             self._rebuild(x)
+        if spin != 0.0:
+            self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
 
     def release(self, hold: Hold, x: Array) -> None:
         """Drops one hold; raises `InputError` for one that is not here."""
@@ -125,8 +160,19 @@ class HoldSet:
         if held.tangent is not None:
             # A force f on r' works like the moment r' x f.
             slope = self._spline.evaluate(np.array([hold.arc_length]), x, 1)[0]
-            moment = np.cross(slope, held.multipliers[d:] @ self._across(held.tangent))
+            across = held.multipliers[d : 2 * d - 1] @ self._across(held.tangent)
+            moment = np.cross(slope, across) + self._compute_torque(held) * held.tangent
         return Reaction(force, moment)
+
+    def _compute_torque(self, held: _Held) -> float:
+        """Moment of a clamp on the hose about the tangent."""
+        if self._spline.dimension == 2:
+            return 0.0
+        if self._spline.has_theta:
+            return float(held.multipliers[-1])
+        twist, clamp = self.rows.twist, self._clamps.index(held.hold.number)
+        arriving = float(twist.torque[twist.ends[:, 1] == clamp].sum())
+        return arriving - float(twist.torque[twist.ends[:, 0] == clamp].sum())
 
     # -- state ---------------------------------------------------------------------------------
 
@@ -142,7 +188,9 @@ class HoldSet:
             }
             for one in self._held
         ]
-        return {"held": held, "n_made": self._n_made, "before": self.rows.before.copy()}
+        twist = {name: getattr(self.rows.twist, name).copy() for name in _REMEMBERED}
+        before = self.rows.before.copy()
+        return {"held": held, "n_made": self._n_made, "before": before, "twist": twist}
 
     def restore(self, state: dict[str, Any], x: Array) -> None:
         """Returns to a snapshot; x are the control points of the same moment."""
@@ -158,6 +206,9 @@ class HoldSet:
         self._n_made = max(self._n_made, state["n_made"])
         self._rebuild(x)
         self.rows.before[:] = state["before"]
+        for name in _REMEMBERED:
+            getattr(self.rows.twist, name)[:] = state["twist"][name]
+        self.rows.twist.frames[:] = self.rows.twist.kept
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -171,21 +222,41 @@ class HoldSet:
         """Unit vectors of the hose's space that are normal to a tangent, (d - 1, 3)."""
         if self._spline.dimension == 2:
             return np.cross(self._spline.normal, tangent)[None]
-        away = np.eye(3)[int(np.argmin(np.abs(tangent)))]
-        first = np.cross(tangent, away)
-        first /= np.linalg.norm(first)
+        first = stretches.find_normal(tangent)
         return np.stack([first, np.cross(tangent, first)])
 
     def _rebuild(self, x: Array) -> None:
-        """Makes the rows of G x = g from the list of holds: positions first, then slopes across.
+        """Makes everything anew from the list of holds; the material stays as it lies."""
+        held = sorted(
+            (one for one in self._held if one.tangent is not None),
+            key=lambda one: one.hold.arc_length,
+        )
+        numbers = [one.hold.number for one in held]
+        if self._spline.dimension == 2 or numbers == self._clamps:
+            self.rows = self._make_rows_of_all(x, self.rows.twist)
+            return
+        same = {k: self._clamps.index(n) for k, n in enumerate(numbers) if n in self._clamps}
+        places = [one.hold.arc_length for one in held]
+        twist = stretches.make_twist(self._spline, self._hose, places, x)
+        if self._spline.has_theta:
+            n_spans = len(self._hose.tables.first)
+            stretches.take_over_frames(twist, self.rows.twist, same, n_spans)
+        else:
+            old = self.rows.twist
+            stretches.take_over_twist(self._spline, self._hose, twist, old, same, x)
+        self._clamps = numbers
+        self.rows = self._make_rows_of_all(x, twist)
+
+    def _make_rows_of_all(self, x: Array, twist: Twist) -> solver.Holds:
+        """Makes the rows of G x = g: positions first, then slopes across, then theta.
 
         `before` is what x meets now, so a hold that was moved goes its way within the next step
         and not before it begins.
         """
-        d = self._spline.dimension
+        d, width = self._spline.dimension, 4 * self._spline.stride
         m = sum(len(held.multipliers) for held in self._held)
         start = np.zeros(m, dtype=np.int64)
-        coefficients, before, after = np.zeros((m, 4 * d)), np.zeros(m), np.zeros(m)
+        coefficients, before, after = np.zeros((m, width)), np.zeros(m), np.zeros(m)
         multipliers = np.zeros(m)
         first = 0
         for held in self._held:
@@ -193,30 +264,36 @@ class HoldSet:
             places, values = self._spline.compute_basis(np.array([held.hold.arc_length]))
             start[own] = places[0]
             coefficients[own] = self._make_rows(held, values[0])
-            before[own] = coefficients[own] @ x[places[0] : places[0] + 4 * d]
+            before[own] = coefficients[own] @ x[places[0] : places[0] + width]
             after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
+            if held.tangent is not None and self._spline.has_theta:
+                after[own.stop - 1] = before[own.stop - 1]
+                twist.turn_rows[self._clamps.index(held.hold.number)] = own.stop - 1
             multipliers[own] = held.multipliers
             # A view: what the kernels write belongs to the hold.
             held.multipliers, held.first = multipliers[own], first
             first = own.stop
-        self.rows = solver.Holds(start, coefficients, before, after, multipliers)
+        return solver.Holds(start, coefficients, before, after, multipliers, twist)
 
     def _aim(self, held: _Held, x: Array) -> None:
         """What `_rebuild` does for a hold of which only the position has changed."""
         d, rows = self._spline.dimension, self.rows
         own = slice(held.first, held.first + len(held.multipliers))
-        window = slice(rows.start[held.first], rows.start[held.first] + 4 * d)
+        start = rows.start[held.first]
+        window = slice(start, start + rows.rows.shape[1])
         rows.before[own] = rows.rows[own] @ x[window]
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
 
     def _make_rows(self, held: _Held, values: Array) -> Array:
-        """Coefficients of one hold's rows from the basis there (3, 4): (d or 2 d - 1, 4 d)."""
-        d = self._spline.dimension
-        rows = np.zeros((len(held.multipliers), 4 * d))
+        """Coefficients of one hold's rows from the basis there (3, 4)."""
+        d, stride = self._spline.dimension, self._spline.stride
+        rows = np.zeros((len(held.multipliers), 4, stride))
         for c in range(d):
-            rows[c, c::d] = values[0]
+            rows[c, :, c] = values[0]
         if held.tangent is not None:
             for k, direction in enumerate(self._across(held.tangent)):
-                rows[d + k] = np.outer(values[1], direction[self._spline.dims]).ravel()
-        return rows
+                rows[d + k, :, :d] = np.outer(values[1], direction[self._spline.dims])
+            if self._spline.has_theta:
+                rows[-1, :, 3] = values[0]
+        return rows.reshape(len(rows), 4 * stride)

@@ -74,12 +74,12 @@ class LoadSet:
         self._rebuild()
 
     def _rebuild(self) -> None:
-        d = self._spline.dimension
+        d, stride = self._spline.dimension, self._spline.stride
         force = self._weight.copy()
         for place, vector in self._forces:
             starts, values = self._spline.compute_basis(np.array([place]))
-            spread = np.outer(values[0, 0], vector[self._spline.dims]).ravel()
-            force[starts[0] : starts[0] + 4 * d] += spread
+            window = force[starts[0] : starts[0] + 4 * stride].reshape(4, stride)
+            window[:, :d] += np.outer(values[0, 0], vector[self._spline.dims])
         places = np.array([place for place, _ in self._moments])
         starts, values = self._spline.compute_basis(places)
         moments = np.zeros((len(places), 3))
@@ -88,5 +88,5 @@ class LoadSet:
                 moments[k] = vector
             else:
                 moments[k, 0] = vector @ self._spline.normal
-        slopes = np.ascontiguousarray(values[:, 1])
-        self.loads = solver.Loads(force, starts, slopes, moments)
+        values = np.ascontiguousarray(values[:, :2])
+        self.loads = solver.Loads(force, starts, values, moments)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, schemes, solver
-from hose_mj.hoses.geds.compiled import compile_notice
+from hose_mj.hoses.geds import basis, energy, frames, schemes, solver, twist
+from hose_mj.hoses.geds.compiled import compile_notice, run_kernel
+from hose_mj.hoses.geds.fittings import average, make_cells
+from hose_mj.hoses.geds.span import Elasticity
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.twist import Twist
 from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
 
@@ -21,22 +24,26 @@ _STATIC_TURN = 0.5
 inextensibility."""
 
 
-_called: set[tuple[Callable[..., Any], int]] = set()
+def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
+    """Returns True for a hose with theta; raises `InputError` for a form that cannot do it."""
+    if form not in (None, "scalar", "theta"):
+        raise InputError("twist", form, "None, scalar, theta")
+    if plane is not None:
+        if form is not None:
+            raise InputError("twist", form, "None for a hose in a plane")
+        return False
+    if form == "scalar" and not spec.is_isotropic:
+        valid = "theta for a hose that is curved at rest or bends unequally"
+        raise InputError("twist", form, valid)
+    if form == "theta" and spec.torsional_stiffness == 0.0:
+        raise InputError("torsional_stiffness", 0.0, "a number above 0 with theta")
+    return form == "theta" or not spec.is_isotropic
 
 
-def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
-    """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
-    version = (kernel, len(axes))
-    if version in _called:
-        return kernel(axes, *arguments)
-    with compile_notice("GEDS kernels"):
-        result = kernel(axes, *arguments)
-    _called.add(version)
-    return result
-
-
-def check_scheme(scheme: str, spec: HoseSpec) -> None:
+def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool) -> None:
     """Raises `InputError` for an unknown scheme, or one that cannot do what the hose needs."""
+    if scheme == "verlet" and has_theta:
+        raise InputError("scheme", scheme, "an implicit scheme for a hose with theta")
     if scheme not in schemes.SCHEMES:
         raise InputError("scheme", scheme, "one of " + ", ".join(schemes.SCHEMES))
     if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0):
@@ -44,25 +51,36 @@ def check_scheme(scheme: str, spec: HoseSpec) -> None:
 
 
 def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
-    """Returns what the kernels need to know of a uniform hose with these knots (n + 4,)."""
+    """Returns what the kernels need to know of a hose with these knots (n + 4,)."""
     with compile_notice("GEDS kernels"):
         tables = basis.make_tables(knots)
     n_spans = len(tables.first)
-    elasticity = energy.Elasticity(
-        np.full(n_spans, spec.axial_stiffness, dtype=np.float64),
-        np.full((n_spans, 3), spec.bending_stiffness, dtype=np.float64),
+    spans = make_cells(np.ones(1), n_spans, spec.length)[:, 0]
+    cells = make_cells(tables.weights, n_spans, spec.length)
+    bending = average(spec, "bending_stiffness", cells)
+    second = spec.second_bending_stiffness or spec.bending_stiffness
+    elasticity = Elasticity(
+        # Springs in series: the mean of the softness counts.
+        1.0 / average(spec, "axial_stiffness", spans, inverse=True),
+        bending,
+        bending * (second / spec.bending_stiffness),
+        average(spec, "torsional_stiffness", cells),
         np.full(n_spans, spec.rest_strain, dtype=np.float64),
         np.full((n_spans, 3), spec.rest_curvature, dtype=np.float64),
+        np.full((n_spans, 3), spec.rest_torsion, dtype=np.float64),
         float(spec.damping_time),
     )
-    mass = basis.make_mass(knots, spec.linear_density)
-    return solver.Hose(tables, elasticity, mass, float(spec.drag / spec.linear_density))
+    quarters = make_cells(basis.MASS_WEIGHTS, n_spans, spec.length)
+    mass = basis.make_mass(knots, average(spec, "linear_density", quarters))
+    # Of a solid round section about its axis.
+    gyration = 0.5 * spec.radius**2
+    return solver.Hose(tables, elasticity, mass, gyration, float(spec.drag / spec.linear_density))
 
 
 def multiply_mass(axes: tuple[float, ...], hose: solver.Hose, flat: Array) -> Array:
-    """Returns M times a flat vector (n d,)."""
+    """Returns M times a flat vector."""
     out = np.zeros(len(flat))
-    run_kernel(solver.multiply_mass, axes, hose.mass, 1.0, flat, out)
+    run_kernel(solver.multiply_mass, axes, hose, 1.0, flat, out)
     return out
 
 
@@ -89,8 +107,10 @@ def find_equilibrium(
     The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails. The
     holds' multipliers are left in work.multipliers.
     """
+    length = hose.tables.span_length * len(hose.tables.first)
     limits = solver.Limits(
-        _STATIC_TOLERANCE * hose.tables.span_length * len(hose.tables.first),
+        _STATIC_TOLERANCE * length,
+        length,
         _STATIC_ITERATIONS,
         _STATIC_TURN,
         False,
@@ -101,6 +121,7 @@ def find_equilibrium(
     shape = x.copy()
     while verdict != solver.DONE and load_steps <= MOST_LOAD_STEPS:
         shape = x.copy()
+        run_kernel(schemes.start_step, axes, holds, np.inf)
         for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
             verdict, iterations, fallbacks = run_kernel(
                 *(solver.newton, axes, hose, stage, holds, 1.0, loads, scale, limits, shape, work)
@@ -113,9 +134,26 @@ def find_equilibrium(
     return Equilibrium(verdict, shape, all_iterations, all_fallbacks)
 
 
+def accept(
+    axes: tuple[float, ...],
+    hose: solver.Hose,
+    holds: solver.Holds,
+    state: schemes.State,
+    work: solver.Work,
+) -> None:
+    """Ends a static solve like a step: holds have moved, twist and frames are what was found."""
+    holds.multipliers[:] = work.multipliers[: len(holds.multipliers)]
+    holds.before[:] = holds.after
+    if len(axes) == 3:
+        run_kernel(twist.accept_twist, axes, holds.twist, state.x)
+    elif len(axes) == 4:
+        run_kernel(frames.accept_frames, axes, hose, holds, state, work.span)
+
+
 def build_tangent(
     axes: tuple[float, ...],
     hose: solver.Hose,
+    holds: solver.Holds,
     loads: solver.Loads,
     x: Array,
     v: Array,
@@ -123,14 +161,15 @@ def build_tangent(
 ) -> None:
     """Writes dU + C v less the point moments to work.gradient, its derivative by x to work.band.
 
-    Forces, gravity, inertia and holds are left out; so is the derivative of the damping.
+    Forces, gravity, inertia and holds are left out; so are the derivative of the damping and the
+    rank-one terms of the twist.
     """
     work.gradient[:] = 0.0
     work.band[:] = 0.0
     work.rate[: len(x)] = v
-    tables, elasticity = hose.tables, hose.elasticity
+    run_kernel(schemes.start_step, axes, holds, np.inf)
     run_kernel(
-        *(energy.assemble, axes, tables, elasticity, x, work.rate, np.inf, True),
+        *(energy.assemble, axes, hose, holds.twist, 0.0, x, work.rate, np.inf, True),
         *(work.span, work.gradient, work.band),
     )
     run_kernel(solver.add_moments, axes, loads, True, x, work)
@@ -165,21 +204,52 @@ def compute_linearization(
     """Returns dense mass, stiffness (from `build_tangent`) and hold rows; overwrites work.band."""
     width = 4 * len(axes)
     stiffness = make_dense(work.band, size, width)
+    for row, compliance in zip(holds.twist.rows, holds.twist.compliance, strict=True):
+        stiffness += np.outer(row[:size], row[:size]) / compliance
     work.band[:] = 0.0
-    run_kernel(solver.add_mass, axes, hose.mass, 1.0, work.band)
+    run_kernel(solver.add_mass, axes, hose, 1.0, work.band)
     mass = make_dense(work.band, size, width)
     return Linearization(mass, stiffness, make_dense_rows(holds, size))
 
 
-def interpolate_tension(strains: Array, axial_stiffness: float, length: float, s: Array) -> Array:
-    """Returns the axial force (k,) N at arc lengths s (k,) from the spans' strain modes (S, 2).
+def interpolate_tension(forces: Array, length: float, s: Array) -> Array:
+    """Returns the axial force (k,) N at arc lengths s (k,) from that of the strain modes (S, 2), N.
 
     Linear between the means at the spans' middles; the end spans know their own slope, sqrt(3) xi
     times the linear mode, xi = -1 .. 1.
     """
-    mean, linear = strains.T * axial_stiffness
+    mean, linear = forces.T
     middles = (np.arange(len(mean)) + 0.5) * length / len(mean)
     nodes = np.concatenate([[0.0], middles, [length]])
     first = mean[0] - np.sqrt(3.0) * linear[0]
     last = mean[-1] + np.sqrt(3.0) * linear[-1]
     return np.asarray(np.interp(s, nodes, np.concatenate([[first], mean, [last]])))
+
+
+def find_torsional_stiffness(hose: solver.Hose, s: Array) -> Array:
+    """Returns GJ (k,) of the cells that arc lengths s (k,) are in."""
+    stiffness = hose.elasticity.torsional_stiffness
+    edges = make_cells(
+        hose.tables.weights, len(stiffness), hose.tables.span_length * len(stiffness)
+    )
+    at = np.searchsorted(edges.reshape(-1, 2)[:-1, 1], s, side="right")
+    return np.asarray(stiffness.ravel()[at])
+
+
+def compute_twist(spline: Spline, hose: solver.Hose, stretches: Twist, s: Array, x: Array) -> Array:
+    """Returns the twist beyond its rest (k,), rad/m, at arc lengths s (k,)."""
+    if spline.has_theta:
+        length = spline.length / len(hose.tables.first)
+        nodes = np.cumsum(np.tile(hose.tables.gaps, len(hose.tables.first))) * length
+        nodes -= nodes[0] - 0.5 * hose.tables.gaps[0] * length
+        gathered = np.interp(s, nodes, stretches.frames[: len(nodes), 9])
+        rest = np.interp(s, nodes, hose.elasticity.rest_torsion.ravel())
+        return np.asarray(spline.evaluate_theta(s, x, 1) + gathered - rest)
+    rate = np.zeros(len(s))
+    places = stretches.places * hose.tables.span_length
+    for (first, last), torque in zip(
+        stretches.ends, stretches.angle / stretches.compliance, strict=True
+    ):
+        inside = (s >= places[first]) & (s <= places[last])
+        rate[inside] = torque / find_torsional_stiffness(hose, s[inside])
+    return rate

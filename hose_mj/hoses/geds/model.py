@@ -14,12 +14,15 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds import mechanics, schemes, solver
 from hose_mj.hoses.geds.body import SplineBody
-from hose_mj.hoses.geds.holds import HoldSet
+from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.model import Array, Curve, Hold, Linearization, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
+
+_TURN_TOLERANCE = 2e-3
+"""What a change of theta (rad) may be when Newton's iteration stops."""
 
 
 class GedsHose(SplineBody):
@@ -34,6 +37,9 @@ class GedsHose(SplineBody):
         control_points: n; the cost of a step is linear in it.
         plane: None for space; "xy", "xz" or "yz" for a hose that stays in that plane, at a fraction
             of the cost.
+        twist: "scalar" for one angle between two clamps, "theta" for an angle at every control
+            point; None for what the spec needs: theta in space where the hose is curved at rest or
+            bends unequally.
         scheme: "bdf2" (default), "backward-euler", "sdirk2", "midpoint" or "verlet".
         tolerance: Newton goes on while it moves a control point by more than this fraction of L;
             with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
@@ -56,6 +62,7 @@ class GedsHose(SplineBody):
         gravity: ArrayLike = (0.0, 0.0, -9.81),
         control_points: int = 16,
         plane: str | None = None,
+        twist: str | None = None,
         scheme: str = "bdf2",
         tolerance: float = 2e-4,
         max_iterations: int = 20,
@@ -63,13 +70,17 @@ class GedsHose(SplineBody):
         check_number("timestep", timestep)
         check_number("tolerance", tolerance)
         check_count("max_iterations", max_iterations, 1)
-        mechanics.check_scheme(scheme, spec)
-        super().__init__(spec, Spline(control_points, spec.length, plane), gravity)
+        has_theta = mechanics.check_twist(twist, spec, plane)
+        mechanics.check_scheme(scheme, spec, has_theta)
+        spline = Spline(control_points, spec.length, plane, has_theta)
+        super().__init__(spec, spline, gravity)
         self.scheme = scheme
         self.fallbacks = self.iterations = self._steps = 0
         self._timestep = float(timestep)
-        self._limits = solver.Limits(tolerance * spec.length, max_iterations, np.inf, False, 0.0)
-        self._holds = HoldSet(self._spline)
+        move = tolerance * spec.length
+        self._limits = solver.Limits(
+            move, move / _TURN_TOLERANCE, max_iterations, np.inf, False, 0.0
+        )
         self._loads = LoadSet(self._spline, self._weight)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
 
@@ -85,20 +96,27 @@ class GedsHose(SplineBody):
         """Simulated time since the last reset (s)."""
         return self._steps * self._timestep
 
-    def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
+    def reset(
+        self, curve: Curve, velocity: Curve | None = None, director: ArrayLike | None = None
+    ) -> None:
         """Lays the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
+
+        The material is laid free of torque.
 
         Args:
             curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.
             velocity: m/s, world frame: (3,), or rows (k, 3) spread evenly over the arc length, or a
                 function of arc lengths (k,) that returns (k, 3); None for rest.
+            director: m1 where the hose begins, (3,), its part along the tangent ignored; only a
+                hose with theta reads it. None for any.
 
         Raises:
             InputError: a curve or a velocity that is not finite, has a wrong shape or leaves the
                 plane of a planar hose; a curve far from the hose's length. Nothing changed then.
         """
+        start = None if director is None else check_vector("director", director)
         self._lay(curve, velocity)
-        self._start()
+        self._start(start)
 
     def set_control_points(self, points: ArrayLike) -> None:
         """Puts the control points at (n, 3) m, at rest, however odd; drops holds and loads.
@@ -169,14 +187,20 @@ class GedsHose(SplineBody):
         return hold
 
     def move(
-        self, hold: Hold, position: ArrayLike | None = None, tangent: ArrayLike | None = None
+        self,
+        hold: Hold,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+        spin: float = 0.0,
     ) -> None:
         """Sets where a hold is to be at the end of the next step: position (3,) m, tangent (3,).
 
-        Raises `InputError` for a hold that was released, a tangent for an attachment, or vectors
+        A clamp's material goes along by the smallest rotation to the new tangent and is turned by
+        `spin` (rad, right-handed about the tangent, any number of turns) on top. Raises
+        `InputError` for a hold that was released, a tangent or a spin for an attachment, vectors
         out of a planar hose's plane.
         """
-        self._holds.move(hold, position, tangent, self._state.x)
+        self._holds.move(hold, position, tangent, spin, self._state.x)
 
     def release(self, hold: Hold) -> None:
         """Lets go; raises `InputError` for a hold that was released before."""
@@ -214,7 +238,7 @@ class GedsHose(SplineBody):
         if check_count("n_steps", n_steps, 0) == 0:
             return
         counts = np.zeros(3, dtype=np.int64)
-        verdict = mechanics.run_kernel(
+        verdict = run_kernel(
             *(schemes.advance, self._axes, self._hose, self._holds.rows, self._loads.loads),
             *(self._limits, schemes.SCHEMES[self.scheme], self._timestep, int(n_steps)),
             *(self._state, counts),
@@ -248,8 +272,7 @@ class GedsHose(SplineBody):
             raise StepError(f"no static equilibrium was found: {solver.VERDICTS[found.verdict]}")
         self._state = schemes.make_state(self._spline.size)
         self._state.x[:] = found.x
-        self._holds.rows.multipliers[:] = self._work.multipliers
-        self._holds.rows.before[:] = self._holds.rows.after
+        mechanics.accept(self._axes, self._hose, self._holds.rows, self._state, self._work)
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and hold rows in the control points' n d coordinates."""
@@ -277,24 +300,24 @@ class GedsHose(SplineBody):
             raise InputError("acceleration", wanted.shape, f"finite numbers, shape ({n}, 3)")
         self._build_tangent()
         drag = self._hose.drag_rate * self._state.v
-        inertia = self._multiply_mass(wanted[:, self._spline.dims].ravel() + drag)
+        inertia = self._multiply_mass(self._spline.from_world(wanted) + drag)
         internal = self._work.gradient[: self._spline.size]
         return self._spline.to_world(inertia + internal - self._loads.loads.force)
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _start(self) -> None:
+    def _start(self, director: Array | None = None) -> None:
         self._steps = 0
         self._loads.clear()
-        self._holds.clear(self._state.x)
+        self._holds.clear(self._state.x, director)
         self._renew_work()
 
     def _renew_work(self) -> None:
-        n_points, dimension = self._spline.n_control_points, self._spline.dimension
-        self._work = solver.make_work(n_points, dimension, self._holds.n_rows)
+        n_points, stride = self._spline.n_control_points, self._spline.stride
+        self._work = solver.make_work(n_points, stride, self._holds.n_rows)
 
     def _build_tangent(self) -> None:
         mechanics.build_tangent(
-            *(self._axes, self._hose, self._loads.loads),
+            *(self._axes, self._hose, self._holds.rows, self._loads.loads),
             *(self._state.x, self._state.v, self._work),
         )

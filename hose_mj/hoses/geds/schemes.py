@@ -13,6 +13,7 @@ import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.compiled import compiled, kernel
+from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.solver import (
     DEPENDENT_HOLDS,
     DONE,
@@ -24,11 +25,14 @@ from hose_mj.hoses.geds.solver import (
     newton,
     solve_with_holds,
 )
+from hose_mj.hoses.geds.twist import accept_twist, start_twist
 from hose_mj.hoses.model import Array
 
 SCHEMES = {"backward-euler": 0, "bdf2": 1, "sdirk2": 2, "midpoint": 3, "verlet": 4}
 _BACKWARD_EULER, _BDF2, _SDIRK2, _MIDPOINT, _VERLET = range(5)
 _GAMMA = 1.0 - np.sqrt(0.5)
+_NO_CHANGE = 1e200
+"""Softness that keeps the twist's rank-one terms out of the mass matrix."""
 
 
 class State(NamedTuple):
@@ -133,9 +137,23 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
 
 
 @kernel
+def start_step(axes, holds, dt):  # type: ignore[no-untyped-def]
+    """Returns twist and frames to the last accepted state; sets the clamps' rates of spin."""
+    twist = holds.twist
+    for clamp in range(len(twist.starts)):
+        twist.spin[clamp, 1] = twist.spin[clamp, 0] / dt
+    if len(axes) == 3:
+        start_twist(twist)
+    elif len(axes) == 4:
+        restore_frames(twist)
+
+
+@kernel
 def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
     """One step; where its Newton fails, backward Euler with a line search in ever finer parts."""
-    careful = Limits(limits.tolerance, 3 * limits.max_iterations, np.inf, True, 0.0)
+    careful = Limits(
+        limits.tolerance, limits.turn_length, 3 * limits.max_iterations, np.inf, True, 0.0
+    )
     verdict = NOT_FINITE
     for attempt in range(ATTEMPTS):
         first = attempt == 0
@@ -144,6 +162,7 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
         else:
             use = scheme if first else _BACKWARD_EULER
         parts = 1 if attempt < 2 else 8 ** (attempt - 1)
+        start_step(axes, holds, dt)
         verdict, h = _try_step(
             axes,
             hose,
@@ -177,6 +196,7 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
     """Velocity Verlet with holds on positions and velocities (RATTLE); no damping, no drag."""
     width = 4 * len(axes)
     size = len(state.x)
+    start_step(axes, holds, dt)
     for k in range(size):
         work.X[k] = state.x[k]
         work.V[k] = state.v[k]
@@ -190,14 +210,16 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
                 gap -= holds.rows[row, k] * aim
             work.shift[row] = 2.0 * gap / (dt * dt if half == 0 else dt)
         # A stage of infinite length has no inertia: what it builds is the force.
-        build(axes, hose, (np.inf, work.X, work.V), loads, 1.0, True, work.X, work)
+        infinite = (np.inf, work.X, work.V)
+        build(axes, hose, infinite, holds.twist, 1.0, loads, 1.0, True, work.X, work)
         for k in range(size):
             for m in range(width):
                 work.band[k, m] = 0.0
-        add_mass(axes, hose.mass, 1.0, work.band)
+        add_mass(axes, hose, 1.0, work.band)
         factorize(axes, size, work.band)
-        if not solve_with_holds(axes, holds, size, work):
-            return DEPENDENT_HOLDS
+        verdict = solve_with_holds(axes, holds, _NO_CHANGE, 0, size, work)
+        if verdict != DONE:
+            return verdict
         for k in range(size):
             work.V[k] += 0.5 * dt * work.gradient[k]
             if half == 0:
@@ -222,7 +244,8 @@ def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts
     arguments: it is the one entry to the dynamics. It makes its work arrays itself, which is
     quicker than handing them over from Python.
     """
-    work = make_work(hose.mass.shape[0], len(axes), len(holds.start))
+    n_rows = len(holds.start) + len(holds.twist.angle)
+    work = make_work(hose.mass.shape[0], len(axes), n_rows)
     for _ in range(n_steps):
         if scheme == _VERLET:
             verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
@@ -236,4 +259,8 @@ def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts
         for row in range(len(holds.start)):
             holds.multipliers[row] = work.multipliers[row]
             holds.before[row] = holds.after[row]
+        if len(axes) == 3:
+            accept_twist(axes, holds.twist, state.x)
+        elif len(axes) == 4:
+            accept_frames(axes, hose, holds, state, work.span)
     return DONE

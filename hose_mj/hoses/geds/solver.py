@@ -17,10 +17,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
+from hose_mj.hoses.geds.band import (
+    factorize,
+    factorize_indefinite,
+    solve_lower,
+    solve_upper,
+)
 from hose_mj.hoses.geds.basis import Tables
 from hose_mj.hoses.geds.compiled import compiled, kernel
-from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
+from hose_mj.hoses.geds.energy import assemble
+from hose_mj.hoses.geds.frames import shift_clamps
+from hose_mj.hoses.geds.span import Elasticity, Span, make_span
+from hose_mj.hoses.geds.twist import Twist, predict_twist
 from hose_mj.hoses.model import Array
 
 DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE, DEPENDENT_HOLDS = range(5)
@@ -34,11 +42,20 @@ VERDICTS = (
 
 
 class Hose(NamedTuple):
-    """Constants of one hose: tables, elasticity, mass band (n, 4) and drag per mass c (1/s)."""
+    """Constants of one hose.
+
+    Attributes:
+        tables: quadrature.
+        elasticity: material.
+        mass: per coordinate, band (n, 4).
+        gyration: rotational inertia about the tangent over mass (m^2), for theta.
+        drag_rate: drag per mass c (1/s).
+    """
 
     tables: Tables
     elasticity: Elasticity
     mass: Array
+    gyration: float
     drag_rate: float
 
 
@@ -51,6 +68,7 @@ class Holds(NamedTuple):
         before: g at the beginning of a step, (m,).
         after: g at its end, (m,).
         multipliers: lambda at the end of the last step, (m,), written.
+        twist: clamps and the twist between them.
     """
 
     start: np.ndarray
@@ -58,6 +76,7 @@ class Holds(NamedTuple):
     before: Array
     after: Array
     multipliers: Array
+    twist: Twist
 
 
 class Loads(NamedTuple):
@@ -66,7 +85,7 @@ class Loads(NamedTuple):
     Attributes:
         force: generalised force on the control points, gravity included, flat (n d,).
         moment_start: index of the first of the 4 d unknowns at each point moment, (k,).
-        moment_basis: dN/ds there, (k, 4).
+        moment_basis: N and dN/ds there, (k, 2, 4).
         moment: (k, 3) N m; a planar hose reads the first entry.
     """
 
@@ -81,14 +100,17 @@ class Limits(NamedTuple):
 
     Attributes:
         tolerance: largest move of a control point in the last iteration (m).
+        turn_length: what a change of theta is multiplied by to compare with that (m).
         max_iterations: Newton iterations at most.
         rotation_cap: largest turn of a tangent in one iteration (rad).
         line_search: True to shorten steps that run past the lowest point along them.
         hold_weight: weight of G^T G in the matrix, relative to its mean diagonal; above 0 where
-            the hose alone has rigid motions (statics).
+            the hose alone has rigid motions (statics). The matrix may be indefinite then, as long
+            as the twist's rank-one terms and the holds make up for it.
     """
 
     tolerance: float
+    turn_length: float
     max_iterations: int
     rotation_cap: float
     line_search: bool
@@ -106,6 +128,7 @@ class Work(NamedTuple):
     gradient: Array
     rate: Array
     band: Array
+    signs: Array
     lower: Array
     schur: Array
     multipliers: Array
@@ -121,7 +144,10 @@ class Work(NamedTuple):
 
 @compiled
 def make_work(n_control_points, dimension, n_rows):  # type: ignore[no-untyped-def]
-    """Returns work arrays for n control points of d unknowns each and m rows of holds."""
+    """Returns work arrays for n control points of d unknowns each and m rows.
+
+    The rows are those of the holds and one for each stretch that has twist.
+    """
     size = n_control_points * dimension
     padded = size + 4 * dimension
     return Work(
@@ -129,6 +155,7 @@ def make_work(n_control_points, dimension, n_rows):  # type: ignore[no-untyped-d
         np.zeros(padded),
         np.zeros(padded),
         np.zeros((padded, 8 * dimension)),
+        np.ones(size),
         np.zeros((n_rows + 1, padded)),
         np.zeros((n_rows, n_rows)),
         np.zeros(n_rows),
@@ -144,46 +171,52 @@ def make_work(n_control_points, dimension, n_rows):  # type: ignore[no-untyped-d
 
 
 @kernel
-def multiply_mass(axes, mass, factor, x, out):  # type: ignore[no-untyped-def]
+def multiply_mass(axes, hose, factor, x, out):  # type: ignore[no-untyped-def]
     """Adds factor M x to out; x and out flat, the first n d entries count."""
     d = len(axes)
+    mass = hose.mass
     n = mass.shape[0]
     for j in range(n):
         for c in range(d):
-            out[j * d + c] += factor * mass[j, 0] * x[j * d + c]
+            scale = factor * (hose.gyration if c == 3 else 1.0)
+            out[j * d + c] += scale * mass[j, 0] * x[j * d + c]
         for k in range(1, min(4, n - j)):
             weight = factor * mass[j, k]
             for c in range(d):
-                out[(j + k) * d + c] += weight * x[j * d + c]
-                out[j * d + c] += weight * x[(j + k) * d + c]
+                scale = weight * (hose.gyration if c == 3 else 1.0)
+                out[(j + k) * d + c] += scale * x[j * d + c]
+                out[j * d + c] += scale * x[(j + k) * d + c]
 
 
 @kernel
-def add_mass(axes, mass, factor, band):  # type: ignore[no-untyped-def]
+def add_mass(axes, hose, factor, band):  # type: ignore[no-untyped-def]
     """Adds factor M to a band."""
     d = len(axes)
-    for j in range(mass.shape[0]):
+    for j in range(hose.mass.shape[0]):
         for c in range(d):
+            scale = factor * (hose.gyration if c == 3 else 1.0)
             for k in range(4):
-                band[j * d + c, k * d] += factor * mass[j, k]
+                band[j * d + c, k * d] += scale * hose.mass[j, k]
 
 
 @kernel
 def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
     """Subtracts the generalised force of the point moments, M x a / A on a = r', from the gradient.
 
-    Its derivative goes into the band: all of it in the plane, its symmetric part in space.
+    Its derivative goes into the band: all of it in the plane, its symmetric part in space. What
+    lies along the tangent acts on theta where there is one.
     """
     d = len(axes)
+    n_places = min(d, 3)
     a = work.span.a[0]
     turn = work.span.b[0]
     for k in range(len(loads.moment_start)):
         start = loads.moment_start[k]
         A = 0.0
-        for c in range(d):
+        for c in range(n_places):
             a[c] = 0.0
             for i in range(4):
-                a[c] += loads.moment_basis[k, i] * x[start + i * d + c]
+                a[c] += loads.moment_basis[k, 1, i] * x[start + i * d + c]
             A += a[c] * a[c]
         A = max(A, 1e-4)
         if d == 2:
@@ -194,21 +227,30 @@ def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
                 m1 = loads.moment[k, (c + 1) % 3]
                 m2 = loads.moment[k, (c + 2) % 3]
                 turn[c] = (m1 * a[(c + 2) % 3] - m2 * a[(c + 1) % 3]) / A
+        if d == 4:
+            along = 0.0
+            for c in range(3):
+                along += loads.moment[k, c] * a[c] / np.sqrt(A)
+            for i in range(4):
+                work.gradient[start + 4 * i + 3] -= loads.moment_basis[k, 0, i] * along
         for i in range(4):
-            for c1 in range(d):
-                work.gradient[start + i * d + c1] -= loads.moment_basis[k, i] * turn[c1]
+            for c1 in range(n_places):
+                work.gradient[start + i * d + c1] -= loads.moment_basis[k, 1, i] * turn[c1]
                 if not exact:
                     continue
                 for j in range(i + 1):
-                    weight = loads.moment_basis[k, i] * loads.moment_basis[k, j] / A
-                    for c2 in range(d if j < i else c1 + 1):
+                    weight = loads.moment_basis[k, 1, i] * loads.moment_basis[k, 1, j] / A
+                    for c2 in range(n_places if j < i else c1 + 1):
                         bend = turn[c1] * a[c2] + a[c1] * turn[c2]
                         work.band[start + j * d + c2, (i - j) * d + c1 - c2] += weight * bend
 
 
 @kernel
-def build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
-    """Fills work.gradient with the residual without holds, work.band with its derivative."""
+def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
+    """Fills work.gradient with the residual without holds, work.band with its derivative.
+
+    The twist's rank-one terms are not in the band: `solve_with_holds` adds them.
+    """
     h, X, V = stage
     size = len(x)
     for k in range(size):
@@ -219,14 +261,15 @@ def build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-u
     if inertia > 0.0:
         for k in range(size):
             work.rate[k] = (x[k] - X[k]) * inertia - V[k] / h
-        multiply_mass(axes, hose.mass, 1.0, work.rate, work.gradient)
-        add_mass(axes, hose.mass, inertia, work.band)
+        multiply_mass(axes, hose, 1.0, work.rate, work.gradient)
+        add_mass(axes, hose, inertia, work.band)
     for k in range(size):
         work.rate[k] = (x[k] - X[k]) / h
     assemble(
         axes,
-        hose.tables,
-        hose.elasticity,
+        hose,
+        twist,
+        progress,
         x,
         work.rate,
         h,
@@ -263,25 +306,43 @@ def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untype
 
 
 @kernel
-def solve_with_holds(axes, holds, size, work):  # type: ignore[no-untyped-def]
-    """Solves K dx - G^T lambda = -gradient, G dx = shift with the factor in work.band.
+def solve_with_holds(axes, holds, softness, n_negative, size, work):  # type: ignore[no-untyped-def]
+    """Solves K dx - R^T lambda = -gradient, R dx + D lambda = shift with the factor in work.band.
 
-    Writes dx into work.gradient and lambda into work.multipliers; False if the rows depend on each
-    other. With K = L L^T: Z = L^-1 G^T, S = Z^T Z, so each row costs one forward solve.
+    The rows R are those of the holds (D = 0) and the derivatives of the stretches' twist
+    (D = compliance times `softness`), which adds R^T R / D to K. Writes dx into work.gradient and
+    lambda into work.multipliers. With K = L S L^T, S the signs of the pivots: Z = L^-1 R^T, and
+    Z^T S Z + D is the matrix of lambda, so each row costs one forward solve.
+
+    Returns DONE; DEPENDENT_HOLDS if the rows depend on each other; NOT_POSITIVE where K with D is
+    not positive definite on the null space of the holds, which is where that matrix has not as
+    many negative pivots as K, `n_negative`.
     """
     width = 4 * len(axes)
-    m = len(holds.start)
+    n_holds = len(holds.start)
+    twist = holds.twist
+    m = n_holds + len(twist.angle)
     z = work.lower
-    for row in range(m):
+    for row in range(n_holds):
         for k in range(z.shape[1]):
             z[row, k] = 0.0
         for k in range(width):
             z[row, holds.start[row] + k] = holds.rows[row, k]
+    for row in range(n_holds, m):
+        work.shift[row] = 0.0
+        for k in range(size):
+            z[row, k] = twist.rows[row - n_holds, k]
+        for k in range(size, z.shape[1]):
+            z[row, k] = 0.0
     for k in range(size):
         z[m, k] = -work.gradient[k]
     for k in range(size, z.shape[1]):
         z[m, k] = 0.0
     solve_lower(axes, size, work.band, z)
+    if n_negative > 0:
+        # Times S: what stands on the right of a product from here on.
+        for k in range(size):
+            z[m, k] *= work.signs[k]
     for row in range(m):
         product = 0.0
         for k in range(size):
@@ -289,49 +350,60 @@ def solve_with_holds(axes, holds, size, work):  # type: ignore[no-untyped-def]
         work.multipliers[row] = work.shift[row] - product
         for other in range(row + 1):
             product = 0.0
-            for k in range(size):
-                product += z[row, k] * z[other, k]
+            if n_negative > 0:
+                for k in range(size):
+                    product += work.signs[k] * z[row, k] * z[other, k]
+            else:
+                for k in range(size):
+                    product += z[row, k] * z[other, k]
             work.schur[row, other] = product
-    if not _solve_dense(work.schur, work.multipliers):
-        return False
+        if row >= n_holds:
+            work.schur[row, row] += softness * twist.compliance[row - n_holds]
+    n_found = _solve_dense(m, work.schur, work.multipliers)
+    if n_found != n_negative:
+        return DEPENDENT_HOLDS if n_found < 0 else NOT_POSITIVE
     for k in range(size):
         value = z[m, k]
+        sign = work.signs[k] if n_negative > 0 else 1.0
         for row in range(m):
-            value += work.multipliers[row] * z[row, k]
+            value += sign * work.multipliers[row] * z[row, k]
         work.gradient[k] = value
     for k in range(size, size + width):
         work.gradient[k] = 0.0
     solve_upper(axes, size, work.band, work.gradient)
-    return True
+    return DONE
 
 
 @kernel
-def _solve_dense(matrix, rhs):  # type: ignore[no-untyped-def]
-    """Cholesky solve in place with the lower half of a small matrix; False if it is singular."""
-    m = len(rhs)
+def _solve_dense(m, matrix, rhs):  # type: ignore[no-untyped-def]
+    """Solves in place by L D L^T with the lower half of a small matrix of m rows.
+
+    Returns the number of negative pivots, -1 if the matrix is singular.
+    """
+    n_negative = 0
     for j in range(m):
         diagonal = matrix[j, j]
         pivot = diagonal
         for k in range(j):
-            pivot -= matrix[j, k] ** 2
-        if not pivot > 1e-13 * diagonal:
-            return False
-        root = np.sqrt(pivot)
-        matrix[j, j] = root
+            pivot -= matrix[j, k] ** 2 * matrix[k, k]
+        if not abs(pivot) > 1e-13 * abs(diagonal):
+            return -1
+        if pivot < 0.0:
+            n_negative += 1
+        matrix[j, j] = pivot
         for i in range(j + 1, m):
             value = matrix[i, j]
             for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = value / root
+                value -= matrix[i, k] * matrix[j, k] * matrix[k, k]
+            matrix[i, j] = value / pivot
     for j in range(m):
         for k in range(j):
             rhs[j] -= matrix[j, k] * rhs[k]
-        rhs[j] /= matrix[j, j]
     for j in range(m - 1, -1, -1):
+        rhs[j] /= matrix[j, j]
         for k in range(j + 1, m):
             rhs[j] -= matrix[k, j] * rhs[k]
-        rhs[j] /= matrix[j, j]
-    return True
+    return n_negative
 
 
 @kernel
@@ -344,7 +416,7 @@ def _largest_turn(axes, tables, x, shift):  # type: ignore[no-untyped-def]
             A = 0.0
             square = 0.0
             along = 0.0
-            for c in range(d):
+            for c in range(min(d, 3)):
                 a = 0.0
                 move = 0.0
                 for i in range(4):
@@ -384,8 +456,10 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
     factor = 0.0
     slope = 0.0
     iteration = 1
+    in_statics = limits.hold_weight > 0.0
+    softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
     while True:
-        build(axes, hose, stage, loads, scale, exact, x, work)
+        build(axes, hose, stage, holds.twist, fraction, loads, scale, exact, x, work)
         # Holds not yet met come first: the line search starts from a point that meets them.
         if limits.line_search and exact and iteration > 2 and shortened < 12:
             turned = 0.0
@@ -395,26 +469,34 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
                 shorter = factor * min(max(slope / (slope - turned), 0.1), 0.7)
                 for k in range(size):
                     x[k] += (shorter - factor) * work.step[k]
+                predict_twist(holds.twist, in_statics, shorter - factor, work.step)
                 factor = shorter
                 shortened += 1
                 continue
         _prepare_holds(axes, holds, fraction, limits.hold_weight, x, work)
-        if not factorize(axes, size, work.band):
-            if not exact:
-                return NOT_POSITIVE, iteration, fallbacks
+        n_negative = 0
+        if in_statics and exact:
+            n_negative = factorize_indefinite(axes, size, work.band, work.signs)
+        elif not factorize(axes, size, work.band):
+            n_negative = -1
+        verdict = NOT_POSITIVE
+        if n_negative >= 0:
+            for k in range(size):
+                work.residual[k] = work.gradient[k]
+            verdict = solve_with_holds(axes, holds, softness, n_negative, size, work)
+        if verdict == NOT_POSITIVE and exact:
             exact = False
             fallbacks += 1
             continue
-        for k in range(size):
-            work.residual[k] = work.gradient[k]
-        if not solve_with_holds(axes, holds, size, work):
-            return DEPENDENT_HOLDS, iteration, fallbacks
+        if verdict != DONE:
+            return verdict, iteration, fallbacks
         largest = 0.0
         slope = 0.0
         for k in range(size):
             work.step[k] = work.gradient[k]
             slope += work.residual[k] * work.step[k]
-            largest = max(largest, abs(work.step[k]))
+            size_of = limits.turn_length if len(axes) == 4 and k % 4 == 3 else 1.0
+            largest = max(largest, abs(work.step[k]) * size_of)
         if not np.isfinite(largest):
             return NOT_FINITE, iteration, fallbacks
         factor = 1.0
@@ -424,6 +506,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
                 factor = limits.rotation_cap / turn
         for k in range(size):
             x[k] += factor * work.step[k]
+        predict_twist(holds.twist, in_statics, factor, work.step)
         if factor == 1.0 and largest <= limits.tolerance:
             return DONE, iteration, fallbacks
         if iteration == limits.max_iterations:
@@ -443,5 +526,7 @@ def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-u
         for k in range(width):
             value -= holds.rows[row, k] * x[holds.start[row] + k]
         work.shift[row] = value
+    if len(axes) == 4:
+        shift_clamps(holds.twist, fraction, work.shift)
     if weight > 0.0:
         _add_hold_weight(axes, holds, weight, len(x), work)

@@ -29,13 +29,14 @@ class Spline:
         n_control_points: n.
         length: rest length L (m).
         plane: None for space, or "xy", "xz", "yz".
+        has_theta: True for a fourth unknown of a control point, the angle of the material.
 
     Attributes:
         n_control_points: n.
         length: L (m).
         knots: open-uniform over [0, L], (n + 4,).
         dims: the world axes of the d coordinates of a control point, ascending.
-        axes: (0.0,) * d, what the kernels take for d.
+        axes: a zero for each unknown of a control point, which is how kernels know them.
         offset: world position (3,) m of the plane's origin; zero along `dims`.
         plane: the constructor's.
 
@@ -43,7 +44,9 @@ class Spline:
         InputError: a number of control points or a plane outside the valid set.
     """
 
-    def __init__(self, n_control_points: int, length: float, plane: str | None) -> None:
+    def __init__(
+        self, n_control_points: int, length: float, plane: str | None, has_theta: bool = False
+    ) -> None:
         n = check_count(
             "control_points", n_control_points, FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS
         )
@@ -54,7 +57,7 @@ class Spline:
         self.plane = plane
         self.knots = basis.make_knots(n, length)
         self.dims = list(PLANES[plane]) if plane else [0, 1, 2]
-        self.axes = (0.0,) * len(self.dims)
+        self.axes = (0.0,) * (len(self.dims) + has_theta)
         self.offset = np.zeros(3)
 
     @property
@@ -63,9 +66,19 @@ class Spline:
         return len(self.dims)
 
     @property
+    def stride(self) -> int:
+        """Unknowns per control point: d, or 4 with theta."""
+        return len(self.axes)
+
+    @property
+    def has_theta(self) -> bool:
+        """True where the fourth unknown of a control point is the angle of the material."""
+        return self.stride == 4
+
+    @property
     def size(self) -> int:
-        """Unknowns of the hose, n d."""
-        return self.n_control_points * self.dimension
+        """Unknowns of the hose."""
+        return self.n_control_points * self.stride
 
     @cached_property
     def normal(self) -> Array:
@@ -76,39 +89,51 @@ class Spline:
     # -- between the world and the kernels -----------------------------------------------------
 
     def to_world(self, flat: Array) -> Array:
-        """Returns flat vectors (n d,) as vectors of the world (n, 3), without the offset."""
-        world = np.zeros((len(flat) // self.dimension, 3))
-        world[:, self.dims] = flat.reshape(-1, self.dimension)
+        """Returns the places in flat unknowns as vectors of the world (n, 3), without offset."""
+        world = np.zeros((len(flat) // self.stride, 3))
+        world[:, self.dims] = flat.reshape(-1, self.stride)[:, : self.dimension]
         return world
+
+    def from_world(self, vectors: Array) -> Array:
+        """Returns vectors of the world (n, 3) as flat unknowns, theta zero."""
+        flat = np.zeros((len(vectors), self.stride))
+        flat[:, : self.dimension] = vectors[:, self.dims]
+        return flat.ravel()
 
     def compute_basis(self, arc_lengths: Array) -> tuple[np.ndarray, Array]:
         """Returns starts (k,) and basis values with two derivatives (k, 3, 4) at arc lengths (k,).
 
-        A start is the index of the first of the 4 d unknowns that shape the hose there.
+        A start is the index of the first of the unknowns that shape the hose there.
         """
         spans, values = basis.compute_basis(self.knots, arc_lengths)
-        return spans * self.dimension, values
+        return spans * self.stride, values
 
     def evaluate(self, arc_lengths: Array, flat: Array, derivative: int = 0) -> Array:
         """Returns sum_i N_i(s) p_i, or its first or second derivative by s, in the world frame.
 
         Args:
             arc_lengths: (k,), m.
-            flat: control points or their velocities, (n d,).
+            flat: control points or their velocities.
             derivative: 0, 1 or 2.
 
         Returns:
             (k, 3), without the offset.
         """
         spans, values = basis.compute_basis(self.knots, arc_lengths)
-        points = flat.reshape(-1, self.dimension)[spans[:, None] + np.arange(4)]
-        world = np.zeros((len(arc_lengths), 3))
-        world[:, self.dims] = np.einsum("ki,kid->kd", values[:, derivative], points)
-        return world
+        points = self.to_world(flat)[spans[:, None] + np.arange(4)]
+        return np.asarray(np.einsum("ki,kid->kd", values[:, derivative], points))
+
+    def evaluate_theta(self, arc_lengths: Array, flat: Array, derivative: int = 0) -> Array:
+        """Returns theta (k,) or its derivative by s; zero for a hose without."""
+        if not self.has_theta:
+            return np.zeros(len(arc_lengths))
+        spans, values = basis.compute_basis(self.knots, arc_lengths)
+        points = flat[3::4][spans[:, None] + np.arange(4)]
+        return np.asarray(np.einsum("ki,ki->k", values[:, derivative], points))
 
     def interpolate(self, arc_lengths: Array, points: Array) -> Array:
-        """Returns flat control points (n d,) of the spline through n points (n, 3) (thesis A.3)."""
-        return basis.interpolate(self.knots, arc_lengths, points[:, self.dims]).ravel()
+        """Returns flat unknowns of the spline through n points (n, 3), theta zero (thesis A.3)."""
+        return self.from_world(basis.interpolate(self.knots, arc_lengths, points))
 
     def compute_jacobian(self, arc_lengths: Array) -> Array:
         """Returns J_pr of thesis A.24 at arc lengths (l,): N_i(s_j), shape (n, l)."""

@@ -3,9 +3,18 @@ import pytest
 import scipy.linalg
 
 from hose_mj.hoses.geds import band as banded
-from hose_mj.hoses.geds import mechanics, solver
+from hose_mj.hoses.geds import mechanics, solver, stretches
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.spec import HoseSpec
 
 N = 9
+SPEC = HoseSpec(
+    length=1.0,
+    axial_stiffness=1e3,
+    bending_stiffness=0.05,
+    torsional_stiffness=0.5,
+    linear_density=0.1,
+)
 dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
@@ -64,33 +73,87 @@ def test_nan_beside_the_diagonal_is_refused(d):
     assert not banded.factorize((0.0,) * d, N * d, packed)
 
 
-def make_holds(d, seed=0):
+def make_holds(d, seed=0, with_twist=False):
     rng = np.random.default_rng(seed)
     start = np.array([0, 0, 2 * d, 5 * d], dtype=np.int64)
     m = len(start)
-    return solver.Holds(start, rng.normal(size=(m, 4 * d)), np.zeros(m), np.zeros(m), np.zeros(m))
+    rows, numbers = rng.normal(size=(m, 4 * d)), np.zeros((3, m))
+    spline = Spline(N, 1.0, "xy" if d == 2 else None)
+    hose = mechanics.make_constants(SPEC, spline.knots)
+    # Three clamps make two stretches, whose rows a test may fill as it likes.
+    clamps = [0.0, 0.5, 1.0] if with_twist else []
+    twist = stretches.make_twist(spline, hose, clamps, np.zeros(spline.size))
+    twist.rows[:, : N * d] = rng.normal(size=(len(twist.angle), N * d))
+    return solver.Holds(start, rows, *numbers, twist)
+
+
+def stack(holds, size):
+    """Rows (m, size) of holds and twist, and the diagonal D (m,) that belongs to them."""
+    rows = mechanics.make_dense_rows(holds, size)
+    twist = holds.twist
+    softness = np.concatenate([np.zeros(len(rows)), 0.5 * twist.compliance])
+    return np.concatenate([rows, twist.rows[:, :size]]), softness
 
 
 @dimensions
-def test_solve_with_holds_matches_the_dense_kkt_system(d):
+@pytest.mark.parametrize("with_twist", [False, True])
+def test_solve_with_holds_matches_the_dense_kkt_system(d, with_twist):
     axes, size = (0.0,) * d, N * d
     for seed in range(5):
         rng = np.random.default_rng(seed)
         dense, packed = make_matrix(d, seed)
-        holds = make_holds(d, seed)
-        m = len(holds.start)
-        rows = mechanics.make_dense_rows(holds, size)
-        gradient, shift = rng.normal(size=size), rng.normal(size=m)
+        holds = make_holds(d, seed, with_twist)
+        rows, softness = stack(holds, size)
+        m, n_holds = len(rows), len(holds.start)
+        gradient, shift = rng.normal(size=size), np.zeros(m)
+        shift[:n_holds] = rng.normal(size=n_holds)
         work = solver.make_work(N, d, m)
         work.band[:] = packed
         work.gradient[:size], work.shift[:m] = gradient, shift
         assert banded.factorize(axes, size, work.band)
-        assert solver.solve_with_holds(axes, holds, size, work)
-        kkt = np.block([[dense, -rows.T], [rows, np.zeros((m, m))]])
+        assert solver.solve_with_holds(axes, holds, 0.5, 0, size, work) == solver.DONE
+        kkt = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
         wanted = np.linalg.solve(kkt, np.concatenate([-gradient, shift]))
         scale = np.abs(wanted).max()
         np.testing.assert_allclose(work.gradient[:size], wanted[:size], atol=1e-8 * scale)
         np.testing.assert_allclose(work.multipliers, wanted[size:], atol=1e-8 * scale)
+
+
+@dimensions
+def test_indefinite_matrix_is_solved_only_where_twist_and_holds_make_it_stable(d):
+    axes, size = (0.0,) * d, N * d
+    n_stable = 0
+    for seed in range(80):
+        rng = np.random.default_rng(seed)
+        dense, packed = make_matrix(d, seed)
+        holds = make_holds(d, seed, d == 3)
+        rows, softness = stack(holds, size)
+        n_holds = len(holds.start)
+        # Just enough off the diagonal to make one eigenvalue negative, or two.
+        lowest = (
+            np.linalg.eigvalsh(dense)[[0, 1]].mean() if seed % 2 else np.linalg.eigvalsh(dense)[0]
+        )
+        dense = dense - (lowest + 0.02) * np.eye(size)
+        packed[:size, 0] -= lowest + 0.02
+        work = solver.make_work(N, d, len(rows))
+        work.band[:] = packed
+        work.gradient[:size] = rng.normal(size=size)
+        gradient = work.gradient[:size].copy()
+        n_negative = banded.factorize_indefinite(axes, size, work.band, work.signs)
+        assert n_negative == np.sum(np.linalg.eigvalsh(dense) < 0.0)
+        verdict = solver.solve_with_holds(axes, holds, 0.5, n_negative, size, work)
+        twist = rows[n_holds:]
+        whole = dense + twist.T @ (twist / softness[n_holds:, None])
+        null = scipy.linalg.null_space(rows[:n_holds])
+        stable = bool(np.linalg.eigvalsh(null.T @ whole @ null)[0] > 0.0)
+        assert verdict == (solver.DONE if stable else solver.NOT_POSITIVE)
+        if stable and n_negative > 0:
+            n_stable += 1
+            kkt = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
+            wanted = np.linalg.solve(kkt, np.concatenate([-gradient, np.zeros(len(rows))]))
+            scale = np.abs(wanted).max()
+            np.testing.assert_allclose(work.gradient[:size], wanted[:size], atol=1e-6 * scale)
+    assert n_stable >= 3
 
 
 @dimensions
@@ -102,4 +165,5 @@ def test_rows_that_depend_on_each_other_are_refused(d):
     work = solver.make_work(N, d, len(holds.start))
     work.band[:] = packed
     assert banded.factorize(axes, size, work.band)
-    assert not solver.solve_with_holds(axes, holds, size, work)
+    verdict = solver.solve_with_holds(axes, holds, 1.0, 0, size, work)
+    assert verdict == solver.DEPENDENT_HOLDS

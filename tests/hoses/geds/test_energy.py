@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import basis, energy, mechanics
+from hose_mj.hoses.geds import basis, energy, mechanics, solver, stretches
+from hose_mj.hoses.geds import span as spans
+from hose_mj.hoses.geds.spline import Spline
 
 N, LENGTH = 8, 1.0
 KNOTS = basis.make_knots(N, LENGTH)
@@ -13,13 +15,28 @@ kinds = pytest.mark.parametrize("kind", KINDS)
 
 
 def make_elasticity(*, strain=0.0, curvature=0.0, damping=0.0, ea=50.0, ei=0.05, n_spans=N - 3):
-    return energy.Elasticity(
-        np.full(n_spans, ea),
-        np.full((n_spans, 3), ei),
-        np.full(n_spans, strain),
-        np.full((n_spans, 3), curvature),
-        damping,
+    points = (n_spans, 3)
+    return spans.Elasticity(
+        axial_stiffness=np.full(n_spans, ea),
+        bending_stiffness=np.full(points, ei),
+        second_stiffness=np.full(points, ei),
+        torsional_stiffness=np.full(points, 0.8 * ei),
+        rest_strain=np.full(n_spans, strain),
+        rest_curvature=np.full(points, curvature),
+        rest_torsion=np.zeros(points),
+        damping_time=damping,
     )
+
+
+def make_constants(elasticity, tables=TABLES):
+    n = len(tables.first) + 3
+    mass = basis.make_mass(basis.make_knots(n, LENGTH), np.full((n - 3, 4), 0.1))
+    return solver.Hose(tables, elasticity, mass, 1e-4, 0.0)
+
+
+def make_no_twist(hose, d):
+    spline = Spline(len(hose.mass), LENGTH, "xy" if d == 2 else None)
+    return stretches.make_twist(spline, hose, [], np.zeros(spline.size))
 
 
 def make_state(kind, d, seed=0):
@@ -41,8 +58,9 @@ def make_state(kind, d, seed=0):
 
 def compute_parts(x, d, elasticity, tables=TABLES):
     strains = np.zeros((len(tables.first), 2))
-    axes = (0.0,) * d
-    return energy.compute_energy(axes, tables, elasticity, x, energy.make_span(), strains)
+    axes, no_frames = (0.0,) * d, np.zeros((0, 10))
+    span = spans.make_span()
+    return energy.compute_energy(axes, tables, elasticity, no_frames, x, span, strains)[:2]
 
 
 def compute_energy(x, d, elasticity):
@@ -56,8 +74,9 @@ def assemble(x, d, elasticity, rate=None, step=np.inf, exact=True):
     speed = np.zeros(size + 4 * d)
     if rate is not None:
         speed[:size] = rate
-    axes, span = (0.0,) * d, energy.make_span()
-    energy.assemble(axes, TABLES, elasticity, x, speed, step, exact, span, gradient, band)
+    axes, span, hose = (0.0,) * d, spans.make_span(), make_constants(elasticity)
+    no_twist = make_no_twist(hose, d)
+    energy.assemble(axes, hose, no_twist, 0.0, x, speed, step, exact, span, gradient, band)
     return gradient[:size], mechanics.make_dense(band, size, 4 * d)
 
 
@@ -89,9 +108,9 @@ def test_gradient_and_hessian_are_derivatives_of_the_energy(d, kind, strain, cur
         np.testing.assert_allclose(by_gradient, hessian, atol=loose * np.abs(hessian).max())
 
 
-@pytest.mark.parametrize("kernel", [energy._stretch, energy._inverse_square])
+@pytest.mark.parametrize("kernel", [spans.compute_stretch, spans.compute_inverse_square])
 def test_continuation_joins_twice_smoothly_and_stays_finite(kernel):
-    edge = energy.SMALLEST_A
+    edge = spans.SMALLEST_A
     below, above = kernel(edge * (1 - 1e-12)), kernel(edge)
     np.testing.assert_allclose(below, above, rtol=1e-10)
     values = np.array([kernel(A) for A in np.linspace(0.0, edge, 50)])

@@ -1,0 +1,223 @@
+"""The reference frames of a hose with theta: how they are laid, taken along and laid anew.
+
+Frames that go along with the tangent in time (rod.py) gather, little by little, an angle along the
+hose that the spline theta cannot follow: their own twist rate m. Before m gets large they are laid
+anew along the hose (space-parallel: m = 0), and theta takes over what they had gathered. The
+material directors stay where they were, exactly so at the clamps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
+from hose_mj.hoses.geds.compiled import compiled, kernel
+from hose_mj.hoses.geds.rod import move_frame
+from hose_mj.hoses.geds.span import compute_derivatives
+from hose_mj.hoses.geds.twist import carry, compute_tangent
+
+LARGEST_GATHERED = 0.1
+"""Twist rate of the frames times a span's length (rad) above which they are laid anew."""
+_STIFF = 1e8
+"""Weight of a clamp's theta in the fit, relative to a Gauss point's."""
+
+
+@kernel
+def move_frames(axes, tables, twist, x, p):  # type: ignore[no-untyped-def]
+    """Takes all frames along to the shape x."""
+    n_spans = tables.first.shape[0]
+    for e in range(n_spans):
+        for g in range(3):
+            compute_derivatives(axes, tables, e, g, x, p.a, p.b)
+            a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
+            move_frame(twist.frames, 3 * e + g, a0, a1, a2, p.b[g, 0], p.b[g, 1], p.b[g, 2])
+    move_clamp_frames(axes, twist, x)
+
+
+@kernel
+def move_clamp_frames(axes, twist, x):  # type: ignore[no-untyped-def]
+    """Takes the frames at the clamps along to the shape x."""
+    f = twist.frames
+    first = f.shape[0] - len(twist.starts)
+    for clamp in range(len(twist.starts)):
+        row = first + clamp
+        t0, t1, t2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+        u0, u1, u2 = f[row, 0], f[row, 1], f[row, 2]
+        d0, d1, d2 = carry(u0, u1, u2, t0, t1, t2, f[row, 6], f[row, 7], f[row, 8])
+        f[row, 0], f[row, 1], f[row, 2] = t0, t1, t2
+        f[row, 6], f[row, 7], f[row, 8] = d0, d1, d2
+
+
+@kernel
+def restore_frames(twist):  # type: ignore[no-untyped-def]
+    """Returns to the frames of the last accepted state."""
+    for f in range(twist.frames.shape[0]):
+        for k in range(10):
+            twist.frames[f, k] = twist.kept[f, k]
+
+
+@kernel
+def keep_frames(twist):  # type: ignore[no-untyped-def]
+    """Accepts the frames as they are."""
+    for f in range(twist.frames.shape[0]):
+        for k in range(10):
+            twist.kept[f, k] = twist.frames[f, k]
+
+
+@kernel
+def shift_clamps(twist, progress, shift):  # type: ignore[no-untyped-def]
+    """Adds to each clamp's wanted change of theta its spin and what its frame went astray.
+
+    The frame at a clamp has gone from iterate to iterate, the clamp in one smallest rotation.
+    """
+    f = twist.frames
+    k = twist.kept
+    first = f.shape[0] - len(twist.starts)
+    for clamp in range(len(twist.starts)):
+        row = first + clamp
+        t0, t1, t2 = f[row, 0], f[row, 1], f[row, 2]
+        u0, u1, u2 = k[row, 0], k[row, 1], k[row, 2]
+        d0, d1, d2 = carry(u0, u1, u2, t0, t1, t2, k[row, 6], k[row, 7], k[row, 8])
+        angle = _compute_angle(t0, t1, t2, f[row, 6], f[row, 7], f[row, 8], d0, d1, d2)
+        shift[twist.turn_rows[clamp]] += progress * twist.spin[clamp, 0] + angle
+
+
+@kernel
+def _compute_angle(t0, t1, t2, d0, d1, d2, e0, e1, e2):  # type: ignore[no-untyped-def]
+    """Angle from d to e about t, right-handed, in (-pi, pi]."""
+    across = t0 * (d1 * e2 - d2 * e1) + t1 * (d2 * e0 - d0 * e2) + t2 * (d0 * e1 - d1 * e0)
+    return np.arctan2(across, d0 * e0 + d1 * e1 + d2 * e2)
+
+
+@kernel
+def lay_frames(axes, tables, twist, x, p, frames):  # type: ignore[no-untyped-def]
+    """Lays frames without twist along the hose, from the director in row 0 of `frames` on."""
+    n_spans = tables.first.shape[0]
+    u0, u1, u2 = 0.0, 0.0, 0.0
+    d0, d1, d2 = frames[0, 6], frames[0, 7], frames[0, 8]
+    for e in range(n_spans):
+        for g in range(3):
+            compute_derivatives(axes, tables, e, g, x, p.a, p.b)
+            row = 3 * e + g
+            for k in range(10):
+                frames[row, k] = 0.0
+            a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
+            # From nothing: a first move sets t and t', whatever it does to d and m.
+            move_frame(frames, row, a0, a1, a2, p.b[g, 0], p.b[g, 1], p.b[g, 2])
+            t0, t1, t2 = frames[row, 0], frames[row, 1], frames[row, 2]
+            s0, s1, s2 = frames[row, 3], frames[row, 4], frames[row, 5]
+            if row == 0:
+                along = d0 * t0 + d1 * t1 + d2 * t2
+                d0, d1, d2 = d0 - along * t0, d1 - along * t1, d2 - along * t2
+            else:
+                d0, d1, d2 = carry(u0, u1, u2, t0, t1, t2, d0, d1, d2)
+                # What the way between adds: u . (t x t') / (1 + u . t) grows with the square.
+                turn = (
+                    u0 * (t1 * s2 - t2 * s1) + u1 * (t2 * s0 - t0 * s2) + u2 * (t0 * s1 - t1 * s0)
+                )
+                gap = tables.gaps[g] * tables.span_length
+                angle = gap / 3.0 * turn / max(1.0 + u0 * t0 + u1 * t1 + u2 * t2, 1e-6)
+                e0, e1, e2 = t1 * d2 - t2 * d1, t2 * d0 - t0 * d2, t0 * d1 - t1 * d0
+                d0, d1, d2 = d0 + angle * e0, d1 + angle * e1, d2 + angle * e2
+            inverse = 1.0 / np.sqrt(max(d0 * d0 + d1 * d1 + d2 * d2, 1e-12))
+            d0, d1, d2 = d0 * inverse, d1 * inverse, d2 * inverse
+            frames[row, 6], frames[row, 7], frames[row, 8], frames[row, 9] = d0, d1, d2, 0.0
+            u0, u1, u2 = t0, t1, t2
+    for clamp in range(len(twist.starts)):
+        row = 3 * n_spans + clamp
+        near = _find_gauss_point(tables, n_spans, twist.places[clamp])
+        u0, u1, u2 = frames[near, 0], frames[near, 1], frames[near, 2]
+        d0, d1, d2 = frames[near, 6], frames[near, 7], frames[near, 8]
+        t0, t1, t2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+        d0, d1, d2 = carry(u0, u1, u2, t0, t1, t2, d0, d1, d2)
+        frames[row, 0], frames[row, 1], frames[row, 2] = t0, t1, t2
+        frames[row, 6], frames[row, 7], frames[row, 8] = d0, d1, d2
+
+
+@kernel
+def _find_gauss_point(tables, n_spans, place):  # type: ignore[no-untyped-def]
+    """The Gauss point that is nearest to a place (in spans from the start)."""
+    e = min(int(place), n_spans - 1)
+    inside = place - e
+    edge = 0.5 - 0.5 * tables.gaps[1]
+    g = 0 if inside < edge else (1 if inside < 1.0 - edge else 2)
+    return 3 * e + g
+
+
+@compiled
+def lay_anew(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
+    """Lays the frames anew along the hose; theta takes over what they had gathered.
+
+    Works on twist.frames, x and x_old; the change of theta is fitted to values and slopes at the
+    Gauss points, and to the clamps.
+    """
+    tables = hose.tables
+    twist = holds.twist
+    n_spans = tables.first.shape[0]
+    n = n_spans + 3
+    fresh = np.zeros_like(twist.frames)
+    for k in range(6, 9):
+        fresh[0, k] = twist.frames[0, k]
+    lay_frames(axes, tables, twist, state.x, p, fresh)
+    band = np.zeros((n + 4, 8))
+    change = np.zeros((1, n + 4))
+    angles = np.zeros(3 * n_spans)
+    for row in range(fresh.shape[0]):
+        f = fresh[row]
+        old = twist.frames[row]
+        angle = _compute_angle(f[0], f[1], f[2], f[6], f[7], f[8], old[6], old[7], old[8])
+        if row < 3 * n_spans:
+            e, g = row // 3, row % 3
+            angles[row] = _unwrap(angle, angles[max(row - 1, 0)])
+            length = tables.span_length
+            _add_fit(e, tables.value[e, g], 1.0, angles[row], band, change)
+            _add_fit(e, tables.first[e, g] * length, 1.0, old[9] * length, band, change)
+        else:
+            clamp = row - 3 * n_spans
+            angle = _unwrap(angle, angles[_find_gauss_point(tables, n_spans, twist.places[clamp])])
+            at = twist.turn_rows[clamp]
+            _add_fit(holds.start[at] // 4, holds.rows[at, 3::4], _STIFF, angle, band, change)
+            holds.before[at] += angle
+            holds.after[at] = holds.before[at]
+    factorize((0.0,), n, band)
+    solve_lower((0.0,), n, band, change)
+    solve_upper((0.0,), n, band, change[0])
+    for j in range(n):
+        state.x[4 * j + 3] += change[0, j]
+        state.x_old[4 * j + 3] += change[0, j]
+    twist.frames[:] = fresh
+
+
+@kernel
+def _unwrap(angle, near):  # type: ignore[no-untyped-def]
+    """The angle plus the whole turns that bring it closest to another one."""
+    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+
+
+@kernel
+def _add_fit(start, values, weight, wanted, band, rhs):  # type: ignore[no-untyped-def]
+    """Adds one line of a least-squares fit, sum_i values_i c_(start + i) = wanted."""
+    for i in range(4):
+        rhs[0, start + i] += weight * values[i] * wanted
+        for j in range(i + 1):
+            band[start + j, i - j] += weight * values[i] * values[j]
+
+
+@compiled
+def accept_frames(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
+    """Ends a step of a hose with theta: frames go along, and are laid anew if they have to be."""
+    twist = holds.twist
+    move_frames(axes, hose.tables, twist, state.x, p)
+    for clamp in range(len(twist.starts)):
+        at = twist.turn_rows[clamp]
+        value = 0.0
+        for k in range(holds.rows.shape[1]):
+            value += holds.rows[at, k] * state.x[holds.start[at] + k]
+        holds.before[at] = holds.after[at] = value
+        twist.spin[clamp, 0] = twist.spin[clamp, 1] = 0.0
+    gathered = 0.0
+    for f in range(3 * hose.tables.first.shape[0]):
+        gathered = max(gathered, abs(twist.frames[f, 9]))
+    if gathered * hose.tables.span_length > LARGEST_GATHERED:
+        lay_anew(axes, hose, holds, state, p)
+    keep_frames(twist)

@@ -1,0 +1,269 @@
+"""Twist of a hose that bends alike in every direction: one scalar between two clamps.
+
+Such a hose carries one moment about its tangent from clamp to clamp, whatever its shape: its twist
+is spread evenly over the compliance, and only the total angle Phi of a stretch counts,
+U = Phi^2 / (2 c) with c the integral of ds / GJ. Phi is the angle from the director of the first
+clamp, carried along the hose without twist (Bishop 1975), to that of the last. It is a function of
+the shape and of the clamps; its whole turns are kept by continuity.
+
+The carried director turns in every span
+
+1. by the smallest rotation that takes the knot's tangent u to the next knot's v, and
+2. about v by the integral of u.(a x b) / (A (1 + u.t)), which makes up for the way between.
+
+The variation of Phi by the shape is the integral of kb . da / |a| (kb = a x b / A): a moment M
+works on the hose like the gradient M times that. Nothing is integrated in time, so nothing drifts.
+A stretch that ends at a free end carries no moment and is not here.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.hoses.geds.span import compute_derivatives
+from hose_mj.hoses.model import Array
+
+
+class Twist(NamedTuple):
+    """C clamps and the K stretches between them.
+
+    Attributes:
+        starts: index of the first of the unknowns that shape the hose at a clamp, (C,).
+        places: where each clamp is, in spans from the start, (C,).
+        slopes: dN/ds there, (C, 4).
+        directors: tangent and director of each clamp at the beginning of a step, (C, 6).
+        spin: turn of each clamp about its tangent within the step (rad) and its rate (rad/s),
+            (C, 2).
+        ends: first and last clamp of each stretch, (K, 2).
+        spans: first and last span of each stretch, (K, 2).
+        weights: Gauss weights times length, of the part of a span that is in the stretch,
+            (K, S, 3).
+        compliance: integral of ds / GJ (1 / (N m)), (K,).
+        angle: Phi less its rest value at the beginning of a step (rad), (K,).
+        trial: the same at the present iterate, (K,).
+        torque: moment at the present iterate (N m), (K,).
+        frames: reference frames of a hose with theta (rod.py), at the Gauss points and then at the
+            clamps, at the present iterate, (3 S + C, 10).
+        kept: the same at the beginning of a step.
+        turn_rows: row of the holds that fixes theta at each clamp, (C,).
+        carried: work: the tangent u, the director and the sum of item 2, (K, 7).
+        rows: derivative of Phi by the unknowns, (K, size + padding).
+    """
+
+    starts: np.ndarray
+    places: Array
+    slopes: Array
+    directors: Array
+    spin: Array
+    ends: np.ndarray
+    spans: np.ndarray
+    weights: Array
+    compliance: Array
+    angle: Array
+    trial: Array
+    torque: Array
+    frames: Array
+    kept: Array
+    turn_rows: np.ndarray
+    carried: Array
+    rows: Array
+
+
+@kernel
+def compute_tangent(axes, start, slopes, row, x):  # type: ignore[no-untyped-def]
+    """Unit tangent from the four control points whose first unknown is `start`."""
+    d = len(axes)
+    n0, n1, n2, n3 = slopes[row, 0], slopes[row, 1], slopes[row, 2], slopes[row, 3]
+    t0 = n0 * x[start] + n1 * x[start + d] + n2 * x[start + 2 * d] + n3 * x[start + 3 * d]
+    k = start + 1
+    t1 = n0 * x[k] + n1 * x[k + d] + n2 * x[k + 2 * d] + n3 * x[k + 3 * d]
+    k = start + 2
+    t2 = n0 * x[k] + n1 * x[k + d] + n2 * x[k + 2 * d] + n3 * x[k + 3 * d]
+    inverse = 1.0 / np.sqrt(max(t0 * t0 + t1 * t1 + t2 * t2, 1e-12))
+    return t0 * inverse, t1 * inverse, t2 * inverse
+
+
+@kernel
+def carry(u0, u1, u2, v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
+    """The director d, normal to u, after the smallest rotation that takes u to v (unit vectors)."""
+    cosine = u0 * v0 + u1 * v1 + u2 * v2
+    factor = (d0 * v0 + d1 * v1 + d2 * v2) / max(1.0 + cosine, 1e-6)
+    return d0 - factor * (u0 + v0), d1 - factor * (u1 + v1), d2 - factor * (u2 + v2)
+
+
+@kernel
+def carry_clamp(directors, clamp, t0, t1, t2):  # type: ignore[no-untyped-def]
+    """The director of a clamp after the smallest rotation of its tangent to t."""
+    d = directors
+    u0, u1, u2 = d[clamp, 0], d[clamp, 1], d[clamp, 2]
+    return carry(u0, u1, u2, t0, t1, t2, d[clamp, 3], d[clamp, 4], d[clamp, 5])
+
+
+@kernel
+def start_twist(twist):  # type: ignore[no-untyped-def]
+    """Begins a step or a solve anew from the last accepted state."""
+    for k in range(len(twist.angle)):
+        twist.trial[k] = twist.angle[k]
+        twist.torque[k] = twist.angle[k] / twist.compliance[k]
+
+
+@kernel
+def open_stretches(axes, twist, x):  # type: ignore[no-untyped-def]
+    """Puts the director of each stretch's first clamp where the tangent now is there."""
+    for k in range(len(twist.angle)):
+        clamp = twist.ends[k, 0]
+        u0, u1, u2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+        d0, d1, d2 = carry_clamp(twist.directors, clamp, u0, u1, u2)
+        twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2] = u0, u1, u2
+        twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5] = d0, d1, d2
+        twist.carried[k, 6] = 0.0
+        for i in range(twist.rows.shape[1]):
+            twist.rows[k, i] = 0.0
+
+
+@kernel
+def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-def]
+    """Carries the directors through span e and adds what twist does there.
+
+    The derivative of Phi goes to twist.rows, the moment's geometric stiffness (scaled by `exact`,
+    with the moment of the last iterate) to p.stiffness; the force follows in `close_stretches`.
+    """
+    for k in range(len(twist.angle)):
+        if e < twist.spans[k, 0] or e > twist.spans[k, 1]:
+            continue
+        u0, u1, u2 = twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2]
+        moment = exact * twist.torque[k]
+        total = 0.0
+        for g in range(3):
+            weight = twist.weights[k, e, g]
+            a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
+            b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
+            inverse = 1.0 / max(a0 * a0 + a1 * a1 + a2 * a2, 1e-4)
+            root = np.sqrt(inverse)
+            # kb and the tangent t.
+            k0 = (a1 * b2 - a2 * b1) * inverse
+            k1 = (a2 * b0 - a0 * b2) * inverse
+            k2 = (a0 * b1 - a1 * b0) * inverse
+            t0, t1, t2 = a0 * root, a1 * root, a2 * root
+            cosine = u0 * t0 + u1 * t1 + u2 * t2
+            total += weight * (u0 * k0 + u1 * k1 + u2 * k2) / max(1.0 + cosine, 1e-6)
+            scale = weight * root
+            s0, s1, s2 = scale * k0, scale * k1, scale * k2
+            for i in range(4):
+                slope = tables.first[e, g, i]
+                at = 3 * (e + i)
+                twist.rows[k, at] += slope * s0
+                twist.rows[k, at + 1] += slope * s1
+                twist.rows[k, at + 2] += slope * s2
+            # By (a, a): -3/2 (t kb^T + kb t^T) / A; by (a, b): [t]x / (2 A).
+            aa = -1.5 * moment * weight * inverse
+            ab = 0.5 * moment * weight * inverse
+            q = p.stiffness
+            q[0, 0, g] += 2.0 * aa * t0 * k0
+            q[1, 0, g] += aa * (t1 * k0 + k1 * t0)
+            q[1, 1, g] += 2.0 * aa * t1 * k1
+            q[2, 0, g] += aa * (t2 * k0 + k2 * t0)
+            q[2, 1, g] += aa * (t2 * k1 + k2 * t1)
+            q[2, 2, g] += 2.0 * aa * t2 * k2
+            q[1, 0, 3 + g] += ab * t2
+            q[2, 0, 3 + g] -= ab * t1
+            q[2, 1, 3 + g] += ab * t0
+            q[1, 0, 6 + g] -= ab * t2
+            q[2, 0, 6 + g] += ab * t1
+            q[2, 1, 6 + g] -= ab * t0
+        if e == twist.spans[k, 1]:
+            clamp = twist.ends[k, 1]
+            v0, v1, v2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+        else:
+            v0, v1, v2 = compute_tangent(axes, 3 * e, tables.ends, e, x)
+        d0, d1, d2 = twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5]
+        d0, d1, d2 = carry(u0, u1, u2, v0, v1, v2, d0, d1, d2)
+        twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2] = v0, v1, v2
+        twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5] = d0, d1, d2
+        twist.carried[k, 6] += total
+
+
+@kernel
+def find_angle(twist, k):  # type: ignore[no-untyped-def]
+    """Sets twist.trial of stretch k, whose director has come to the last clamp."""
+    last = twist.ends[k, 1]
+    t0, t1, t2 = twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2]
+    d0, d1, d2 = twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5]
+    e0, e1, e2 = carry_clamp(twist.directors, last, t0, t1, t2)
+    across = t0 * (d1 * e2 - d2 * e1) + t1 * (d2 * e0 - d0 * e2) + t2 * (d0 * e1 - d1 * e0)
+    angle = np.arctan2(across, d0 * e0 + d1 * e1 + d2 * e2) - twist.carried[k, 6]
+    turn = 2.0 * np.pi
+    twist.trial[k] = angle + turn * np.round((twist.trial[k] - angle) / turn)
+
+
+@kernel
+def close_stretches(twist, fraction, tau, rate, gradient):  # type: ignore[no-untyped-def]
+    """Finds Phi and the moment of each stretch, and adds the moment's force to the gradient.
+
+    Args:
+        twist: after `add_twist` of all spans.
+        fraction: of the clamps' spin that is done.
+        tau: Kelvin-Voigt relaxation time (s).
+        rate: velocity of the unknowns; read only where tau is not 0.
+        gradient: added to.
+    """
+    for k in range(len(twist.angle)):
+        find_angle(twist, k)
+        first, last = twist.ends[k, 0], twist.ends[k, 1]
+        angle = twist.trial[k] + fraction * (twist.spin[last, 0] - twist.spin[first, 0])
+        if tau != 0.0:
+            speed = twist.spin[last, 1] - twist.spin[first, 1]
+            for i in range(twist.rows.shape[1]):
+                speed += twist.rows[k, i] * rate[i]
+            angle += tau * speed
+        twist.torque[k] = angle / twist.compliance[k]
+        for i in range(twist.rows.shape[1]):
+            gradient[i] += twist.torque[k] * twist.rows[k, i]
+
+
+@kernel
+def predict_twist(twist, in_statics, factor, step):  # type: ignore[no-untyped-def]
+    """Foresees Phi after the shape has moved by factor times step, so that no turn is lost.
+
+    A time step changes Phi by less than half a turn, however its iterates stray; a static solve may
+    go far, but its iterates are capped.
+    """
+    for k in range(len(twist.angle)):
+        if in_statics:
+            for i in range(len(step)):
+                twist.trial[k] += factor * twist.rows[k, i] * step[i]
+        else:
+            twist.trial[k] = twist.angle[k]
+
+
+@kernel
+def accept_twist(axes, twist, x):  # type: ignore[no-untyped-def]
+    """Ends a step: Phi becomes the last iterate's, the clamps' directors go along with the hose."""
+    for k in range(len(twist.angle)):
+        first, last = twist.ends[k, 0], twist.ends[k, 1]
+        twist.angle[k] = twist.trial[k] + twist.spin[last, 0] - twist.spin[first, 0]
+    for clamp in range(len(twist.starts)):
+        t0, t1, t2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+        d0, d1, d2 = carry_clamp(twist.directors, clamp, t0, t1, t2)
+        d = twist.directors
+        cosine, sine = np.cos(twist.spin[clamp, 0]), np.sin(twist.spin[clamp, 0])
+        d[clamp, 0], d[clamp, 1], d[clamp, 2] = t0, t1, t2
+        d[clamp, 3] = cosine * d0 + sine * (t1 * d2 - t2 * d1)
+        d[clamp, 4] = cosine * d1 + sine * (t2 * d0 - t0 * d2)
+        d[clamp, 5] = cosine * d2 + sine * (t0 * d1 - t1 * d0)
+        twist.spin[clamp, 0] = twist.spin[clamp, 1] = 0.0
+
+
+@kernel
+def measure_twist(axes, tables, twist, x, p):  # type: ignore[no-untyped-def]
+    """Sets twist.trial to Phi at the shape x, in the turn that is closest to the trial before."""
+    open_stretches(axes, twist, x)
+    for e in range(tables.first.shape[0]):
+        for g in range(3):
+            compute_derivatives(axes, tables, e, g, x, p.a, p.b)
+        add_twist(axes, tables, twist, e, 0.0, x, p)
+    for k in range(len(twist.angle)):
+        find_angle(twist, k)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -71,6 +71,9 @@ class Case:
         clamped: True where one end is clamped, so that a chain's clamp can be corrected.
         models: the models that the case is run with.
         steps: time steps of GEDS (s), coarse to fine; dynamic cases only.
+        resolutions: by model, in place of the grid's; static cases only.
+        promised: largest error of GEDS by control points, which `compare` checks; by default that
+            of the finest.
     """
 
     id: str
@@ -87,6 +90,8 @@ class Case:
     clamped: bool = False
     models: tuple[str, ...] = ("geds", "cable", "hinge-chain")
     steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
+    resolutions: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    promised: Mapping[int, float] = field(default_factory=dict)
 
 
 def lay_straight(hose: HoseModel) -> None:

@@ -25,6 +25,13 @@ from hose_mj.validation.statics import (
     make_heavy_cantilever,
     make_tip_load,
 )
+from hose_mj.validation.twisted import (
+    make_bend,
+    make_coil,
+    make_greenhill,
+    make_helix,
+    make_ring,
+)
 
 CASES: tuple[Case, ...] = (
     *(make_heavy_cantilever(gamma) for gamma in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)),
@@ -35,6 +42,11 @@ CASES: tuple[Case, ...] = (
     make_hanging_chain(),
     make_catenary(),
     *(make_euler_buckling(ends) for ends in ("clamped-free", "pinned")),
+    *(make_bend(load) for load in (300.0, 600.0)),
+    *(make_ring(ratio) for ratio in (0.5, 0.75, 1.0, 1.25)),
+    *(make_greenhill(pull) for pull in (0.0, 10.0, 100.0)),
+    make_helix(),
+    make_coil(),
     make_free_flight(),
     make_released_rod(),
     make_taut_pull(),

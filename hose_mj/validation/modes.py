@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import eigh, null_space
+from scipy.optimize import brentq
 
 from hose_mj.hoses.model import Array, Linearization
 
@@ -50,6 +51,40 @@ def compute_critical_load(
     theta = eigh(0.5 * (left + left.T), 0.5 * (right + right.T), eigvals_only=True)
     lowest = float(np.min(theta[theta > 1e-3]))
     return pull * lowest / (1.0 - lowest)
+
+
+def compute_critical_twist(
+    untwisted: Linearization, twisted: Linearization, twist: float, n_neutral: int = 0
+) -> float:
+    """Returns the twist at which a state that twist does not move loses its stability.
+
+    The stiffness of a straight rod or a flat ring is linear in its twist, K0 + M K1: two
+    linearizations tell K1. Sought is the M at which the lowest eigenvalue, neutral modes left out,
+    vanishes.
+
+    Args:
+        untwisted: the state without twist.
+        twisted: the same with twist, below the critical one.
+        twist: how much, an angle or a moment; the answer is in the same unit.
+        n_neutral: modes that cost no energy whatever the twist.
+    """
+    basis = _free_basis(untwisted)
+    start = basis.T @ untwisted.stiffness @ basis
+    change = (basis.T @ twisted.stiffness @ basis - start) / twist
+
+    def lowest(moment: float) -> float:
+        stiffness = start + moment * change
+        values = eigh(
+            0.5 * (stiffness + stiffness.T),
+            eigvals_only=True,
+            subset_by_index=(n_neutral, n_neutral),
+        )
+        return float(values[0])
+
+    high = twist
+    while lowest(high) > 0.0:
+        high *= 1.3
+    return float(brentq(lowest, 0.0, high, xtol=1e-9 * twist))
 
 
 def _free_basis(small: Linearization) -> Array:

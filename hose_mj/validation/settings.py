@@ -147,7 +147,7 @@ def list_static(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[Set
     """Yields the settings of a static case."""
     for model in models:
         scheme = "statics" if model == "geds" else "newton on joint angles"
-        for resolution in grid.static[model]:
+        for resolution in case.resolutions.get(model, grid.static[model]):
             for corrected in _clamps(model, case):
                 yield Setting(model, scheme, resolution, corrected)
 

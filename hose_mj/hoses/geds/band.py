@@ -1,8 +1,8 @@
 """Cholesky factorization and triangular solves of a symmetric band, in O(n).
 
 A lower band is stored by columns: `band[j, k]` is entry (j + k, j), k = 0 .. 4 d - 1 for d unknowns
-per control point. Rows are 8 d wide and 4 d rows follow the last, all zero, so that every inner
-loop has the fixed length 4 d. In a factor, column 0 holds the inverse diagonal.
+per control point. Rows are 8 d wide and 4 d rows follow the last, all zero, so that inner loops
+have fixed lengths. In a factor, column 0 holds the inverse diagonal.
 """
 
 from __future__ import annotations
@@ -23,12 +23,33 @@ def factorize(axes, size, band):  # type: ignore[no-untyped-def]
         inverse = 1.0 / np.sqrt(pivot)
         for k in range(width):
             band[j, k] *= inverse
-        for k in range(1, width):
-            factor = band[j, k]
-            for m in range(width):
-                band[j + k, m] -= factor * band[j, k + m]
+        _eliminate(axes, j, 1.0, band)
         band[j, 0] = inverse
     return True
+
+
+@kernel
+def _eliminate(axes, j, sign, band):  # type: ignore[no-untyped-def]
+    """Subtracts sign times column j's outer product from the columns after it.
+
+    Four columns at a time have inner loops of one length, four less than those before.
+    """
+    width = 4 * len(axes)
+    _eliminate_from(j, 1, 4, width, sign, band)
+    _eliminate_from(j, 4, 8, width - 4, sign, band)
+    if len(axes) > 2:
+        _eliminate_from(j, 8, 12, width - 8, sign, band)
+    if len(axes) > 3:
+        _eliminate_from(j, 12, 16, width - 12, sign, band)
+
+
+@kernel
+def _eliminate_from(j, first, end, length, sign, band):  # type: ignore[no-untyped-def]
+    """`_eliminate` for columns j + first to j + end - 1."""
+    for k in range(first, end):
+        factor = sign * band[j, k]
+        for m in range(length):
+            band[j + k, m] -= factor * band[j, k + m]
 
 
 @kernel
@@ -52,10 +73,7 @@ def factorize_indefinite(axes, size, band, signs):  # type: ignore[no-untyped-de
         inverse = 1.0 / np.sqrt(sign * pivot)
         for k in range(width):
             band[j, k] *= sign * inverse
-        for k in range(1, width):
-            factor = sign * band[j, k]
-            for m in range(width):
-                band[j + k, m] -= factor * band[j, k + m]
+        _eliminate(axes, j, sign, band)
         band[j, 0] = inverse
     return n_negative
 

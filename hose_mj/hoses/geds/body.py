@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, mechanics, schemes
+from hose_mj.hoses.geds import basis, energy, frames, mechanics, schemes
 from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.holds import HoldSet
 from hose_mj.hoses.geds.span import make_span
@@ -96,6 +96,11 @@ class SplineBody:
         twisting strain, without its Frenet frame).
         """
         s = check_arc_lengths(arc_length, self.spec.length)
+        if self._spline.has_theta:
+            run_kernel(
+                *(frames.move_frames, self._axes, self._hose.tables, self._holds.rows.twist),
+                *(self._state.x, self._span),
+            )
         return mechanics.compute_twist(
             self._spline, self._hose, self._holds.rows.twist, s, self._state.x
         )

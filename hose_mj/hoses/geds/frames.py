@@ -18,6 +18,7 @@ from hose_mj.hoses.geds.twist import carry, compute_tangent
 
 LARGEST_GATHERED = 0.1
 """Twist rate of the frames times a span's length (rad) above which they are laid anew."""
+_GAUSS = np.sqrt(0.6)
 _STIFF = 1e8
 """Weight of a clamp's theta in the fit, relative to a Gauss point's."""
 
@@ -91,10 +92,18 @@ def _compute_angle(t0, t1, t2, d0, d1, d2, e0, e1, e2):  # type: ignore[no-untyp
 
 @kernel
 def lay_frames(axes, tables, twist, x, p, frames):  # type: ignore[no-untyped-def]
-    """Lays frames without twist along the hose, from the director in row 0 of `frames` on."""
+    """Lays frames without twist along the hose, from the director in row 0 of `frames` on.
+
+    That director is where the hose begins. From knot to knot and from a knot to what is in its
+    span: the smallest rotation, and a turn that makes up for the way between (twist.py).
+    """
     n_spans = tables.first.shape[0]
-    u0, u1, u2 = 0.0, 0.0, 0.0
     d0, d1, d2 = frames[0, 6], frames[0, 7], frames[0, 8]
+    u0, u1, u2 = _compute_first_tangent(x)
+    along = d0 * u0 + d1 * u1 + d2 * u2
+    d0, d1, d2 = d0 - along * u0, d1 - along * u1, d2 - along * u2
+    inverse = 1.0 / np.sqrt(max(d0 * d0 + d1 * d1 + d2 * d2, 1e-12))
+    d0, d1, d2 = d0 * inverse, d1 * inverse, d2 * inverse
     for e in range(n_spans):
         for g in range(3):
             compute_derivatives(axes, tables, e, g, x, p.a, p.b)
@@ -102,36 +111,63 @@ def lay_frames(axes, tables, twist, x, p, frames):  # type: ignore[no-untyped-de
             for k in range(10):
                 frames[row, k] = 0.0
             a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
-            # From nothing: a first move sets t and t', whatever it does to d and m.
+            # From nothing: a first move sets t and t'.
             move_frame(frames, row, a0, a1, a2, p.b[g, 0], p.b[g, 1], p.b[g, 2])
             t0, t1, t2 = frames[row, 0], frames[row, 1], frames[row, 2]
             s0, s1, s2 = frames[row, 3], frames[row, 4], frames[row, 5]
-            if row == 0:
-                along = d0 * t0 + d1 * t1 + d2 * t2
-                d0, d1, d2 = d0 - along * t0, d1 - along * t1, d2 - along * t2
-            else:
-                d0, d1, d2 = carry(u0, u1, u2, t0, t1, t2, d0, d1, d2)
-                # What the way between adds: u . (t x t') / (1 + u . t) grows with the square.
-                turn = (
-                    u0 * (t1 * s2 - t2 * s1) + u1 * (t2 * s0 - t0 * s2) + u2 * (t0 * s1 - t1 * s0)
-                )
-                gap = tables.gaps[g] * tables.span_length
-                angle = gap / 3.0 * turn / max(1.0 + u0 * t0 + u1 * t1 + u2 * t2, 1e-6)
-                e0, e1, e2 = t1 * d2 - t2 * d1, t2 * d0 - t0 * d2, t0 * d1 - t1 * d0
-                d0, d1, d2 = d0 + angle * e0, d1 + angle * e1, d2 + angle * e2
-            inverse = 1.0 / np.sqrt(max(d0 * d0 + d1 * d1 + d2 * d2, 1e-12))
-            d0, d1, d2 = d0 * inverse, d1 * inverse, d2 * inverse
-            frames[row, 6], frames[row, 7], frames[row, 8], frames[row, 9] = d0, d1, d2, 0.0
-            u0, u1, u2 = t0, t1, t2
-    for clamp in range(len(twist.starts)):
-        row = 3 * n_spans + clamp
-        near = _find_gauss_point(tables, n_spans, twist.places[clamp])
-        u0, u1, u2 = frames[near, 0], frames[near, 1], frames[near, 2]
-        d0, d1, d2 = frames[near, 6], frames[near, 7], frames[near, 8]
-        t0, t1, t2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+            turn = u0 * (t1 * s2 - t2 * s1) + u1 * (t2 * s0 - t0 * s2) + u2 * (t0 * s1 - t1 * s0)
+            # Kept in the place of m until the span is done.
+            frames[row, 9] = turn / max(1.0 + u0 * t0 + u1 * t1 + u2 * t2, 1e-6)
+        for g in range(3):
+            row = 3 * e + g
+            t0, t1, t2 = frames[row, 0], frames[row, 1], frames[row, 2]
+            angle = _integrate_turn(tables, frames, e, _GAUSS * (g - 1))
+            c0, c1, c2 = carry(u0, u1, u2, t0, t1, t2, d0, d1, d2)
+            c0, c1, c2 = _turn(t0, t1, t2, c0, c1, c2, angle)
+            frames[row, 6], frames[row, 7], frames[row, 8] = c0, c1, c2
+        for clamp in range(len(twist.starts)):
+            if min(int(twist.places[clamp]), n_spans - 1) == e:
+                row = 3 * n_spans + clamp
+                t0, t1, t2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
+                angle = _integrate_turn(tables, frames, e, 2.0 * (twist.places[clamp] - e) - 1.0)
+                c0, c1, c2 = carry(u0, u1, u2, t0, t1, t2, d0, d1, d2)
+                c0, c1, c2 = _turn(t0, t1, t2, c0, c1, c2, angle)
+                frames[row, 0], frames[row, 1], frames[row, 2] = t0, t1, t2
+                frames[row, 6], frames[row, 7], frames[row, 8] = c0, c1, c2
+        t0, t1, t2 = compute_tangent(axes, 4 * e, tables.ends, e, x)
         d0, d1, d2 = carry(u0, u1, u2, t0, t1, t2, d0, d1, d2)
-        frames[row, 0], frames[row, 1], frames[row, 2] = t0, t1, t2
-        frames[row, 6], frames[row, 7], frames[row, 8] = d0, d1, d2
+        d0, d1, d2 = _turn(t0, t1, t2, d0, d1, d2, _integrate_turn(tables, frames, e, 1.0))
+        u0, u1, u2 = t0, t1, t2
+        for g in range(3):
+            frames[3 * e + g, 9] = 0.0
+
+
+@kernel
+def _compute_first_tangent(x):  # type: ignore[no-untyped-def]
+    """Unit tangent where the hose begins: from the first control point to the second."""
+    t0, t1, t2 = x[4] - x[0], x[5] - x[1], x[6] - x[2]
+    inverse = 1.0 / np.sqrt(max(t0 * t0 + t1 * t1 + t2 * t2, 1e-24))
+    return t0 * inverse, t1 * inverse, t2 * inverse
+
+
+@kernel
+def _integrate_turn(tables, frames, e, end):  # type: ignore[no-untyped-def]
+    """Integral of what stands in the frames' last column from the span's start to `end` (-1 to 1).
+
+    Of the parabola through the three Gauss points.
+    """
+    f0, f1, f2 = frames[3 * e, 9], frames[3 * e + 1, 9], frames[3 * e + 2, 9]
+    slope, bend = (f2 - f0) / (2.0 * _GAUSS), (f2 - 2.0 * f1 + f0) / (2.0 * _GAUSS**2)
+    whole = f1 * (end + 1.0) + slope * (end**2 - 1.0) / 2.0 + bend * (end**3 + 1.0) / 3.0
+    return 0.5 * tables.span_length * whole
+
+
+@kernel
+def _turn(t0, t1, t2, d0, d1, d2, angle):  # type: ignore[no-untyped-def]
+    """The director d, normal to the unit vector t, turned by an angle about it."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    e0, e1, e2 = t1 * d2 - t2 * d1, t2 * d0 - t0 * d2, t0 * d1 - t1 * d0
+    return cosine * d0 + sine * e0, cosine * d1 + sine * e1, cosine * d2 + sine * e2
 
 
 @kernel
@@ -156,9 +192,15 @@ def lay_anew(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
     n_spans = tables.first.shape[0]
     n = n_spans + 3
     fresh = np.zeros_like(twist.frames)
-    for k in range(6, 9):
-        fresh[0, k] = twist.frames[0, k]
+    # Any director will do: what differs at the first Gauss point differs everywhere.
+    for k in range(3):
+        fresh[0, 6 + k] = twist.frames[0, 6 + k]
     lay_frames(axes, tables, twist, state.x, p, fresh)
+    f, old = fresh[0], twist.frames[0]
+    offset = _compute_angle(f[0], f[1], f[2], f[6], f[7], f[8], old[6], old[7], old[8])
+    for row in range(fresh.shape[0]):
+        f = fresh[row]
+        f[6], f[7], f[8] = _turn(f[0], f[1], f[2], f[6], f[7], f[8], offset)
     band = np.zeros((n + 4, 8))
     change = np.zeros((1, n + 4))
     angles = np.zeros(3 * n_spans)
@@ -205,9 +247,12 @@ def _add_fit(start, values, weight, wanted, band, rhs):  # type: ignore[no-untyp
 
 @compiled
 def accept_frames(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
-    """Ends a step of a hose with theta: frames go along, and are laid anew if they have to be."""
+    """Ends a step of a hose with theta: frames are laid anew if they have gathered too much.
+
+    Else they stay where the last iterate has put them, but for those of the clamps.
+    """
     twist = holds.twist
-    move_frames(axes, hose.tables, twist, state.x, p)
+    move_clamp_frames(axes, twist, state.x)
     for clamp in range(len(twist.starts)):
         at = twist.turn_rows[clamp]
         value = 0.0
@@ -219,5 +264,6 @@ def accept_frames(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
     for f in range(3 * hose.tables.first.shape[0]):
         gathered = max(gathered, abs(twist.frames[f, 9]))
     if gathered * hose.tables.span_length > LARGEST_GATHERED:
+        move_frames(axes, hose.tables, twist, state.x, p)
         lay_anew(axes, hose, holds, state, p)
     keep_frames(twist)

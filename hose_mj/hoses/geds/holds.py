@@ -22,6 +22,7 @@ from hose_mj.hoses.geds.frames import lay_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist
+from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.model import Array, Hold, Reaction
 from hose_mj.hoses.spec import check_number
 
@@ -75,9 +76,7 @@ class HoldSet:
         twist = stretches.make_twist(self._spline, self._hose, [], x)
         if self._spline.has_theta:
             start = stretches.make_directors(self._spline, np.zeros(1), x)[0]
-            seed = start[3:] if director is None else director
-            first = stretches.find_first_tangent(self._spline, self._hose, x)
-            twist.frames[0, 6:9] = stretches.carry_director(start[:3], first, seed)
+            twist.frames[0, 6:9] = start[3:] if director is None else director
             axes, tables = self._spline.axes, self._hose.tables
             run_kernel(lay_frames, axes, tables, twist, x, make_span(), twist.frames)
             twist.kept[:] = twist.frames
@@ -144,6 +143,41 @@ class HoldSet:
             self._rebuild(x)
         if spin != 0.0:
             self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
+
+    def check_director(self, director: ArrayLike, tangent: Array) -> Array:
+        """Returns the part of a director (3,) across a unit tangent, as a unit vector.
+
+        Raises:
+            InputError: three numbers that are not, one along the tangent, any for a planar hose.
+        """
+        vector = check_vector("director", director)
+        if self._spline.dimension == 2:
+            raise InputError("director", vector.tolist(), "None for a hose in a plane")
+        across = vector - (vector @ tangent) * tangent
+        length = float(np.linalg.norm(across))
+        if length < 1e-9 * float(np.linalg.norm(vector)) or length == 0.0:
+            raise InputError("director", vector.tolist(), "a vector across the tangent")
+        return np.asarray(across / length)
+
+    def turn_to(self, hold: Hold, director: Array, x: Array) -> None:
+        """Lets the material at a clamp turn to a director within the next step."""
+        held = self._find(hold)
+        clamp, twist = self._clamps.index(hold.number), self.rows.twist
+        assert held.tangent is not None
+        if self._spline.has_theta:
+            row = 3 * len(self._hose.tables.first) + clamp
+            theta = float(self._spline.evaluate_theta(np.array([hold.arc_length]), x)[0])
+            tangent, base = twist.kept[row, :3], twist.kept[row, 6:9]
+            now = np.cos(theta) * base + np.sin(theta) * np.cross(tangent, base)
+        else:
+            tangent, now = twist.directors[clamp, :3], twist.directors[clamp, 3:]
+        now = stretches.carry_director(tangent, held.tangent, now)
+        angle = float(np.arctan2(np.cross(now, director) @ held.tangent, now @ director))
+        if self._spline.has_theta or len(self._clamps) > 1:
+            twist.spin[clamp, 0] += angle
+        else:
+            # Nothing else knows the angle of a hose without theta.
+            stretches.turn_director(twist, clamp, angle)
 
     def release(self, hold: Hold, x: Array) -> None:
         """Drops one hold; raises `InputError` for one that is not here."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, frames, schemes, solver, twist
+from hose_mj.hoses.geds import basis, energy, schemes, solver
 from hose_mj.hoses.geds.compiled import compile_notice, run_kernel
 from hose_mj.hoses.geds.fittings import average, make_cells
 from hose_mj.hoses.geds.span import Elasticity
@@ -15,13 +13,6 @@ from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist
 from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
-
-MOST_LOAD_STEPS = 64
-_STATIC_TOLERANCE = 1e-10
-_STATIC_ITERATIONS = 400
-_STATIC_TURN = 0.5
-"""Largest turn of a tangent in one static iteration (rad): beats an energy line search near
-inextensibility."""
 
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
@@ -82,72 +73,6 @@ def multiply_mass(axes: tuple[float, ...], hose: solver.Hose, flat: Array) -> Ar
     out = np.zeros(len(flat))
     run_kernel(solver.multiply_mass, axes, hose, 1.0, flat, out)
     return out
-
-
-class Equilibrium(NamedTuple):
-    """Answer of `find_equilibrium`: a verdict of solver.py, control points (n d,), counters."""
-
-    verdict: int
-    x: Array
-    iterations: int
-    fallbacks: int
-
-
-def find_equilibrium(
-    axes: tuple[float, ...],
-    hose: solver.Hose,
-    holds: solver.Holds,
-    loads: solver.Loads,
-    x: Array,
-    work: solver.Work,
-    load_steps: int,
-) -> Equilibrium:
-    """Newton's iteration for statics, capped by the turn of the tangents.
-
-    The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails. The
-    holds' multipliers are left in work.multipliers.
-    """
-    length = hose.tables.span_length * len(hose.tables.first)
-    limits = solver.Limits(
-        _STATIC_TOLERANCE * length,
-        length,
-        _STATIC_ITERATIONS,
-        _STATIC_TURN,
-        False,
-        1.0,
-    )
-    stage = (np.inf, x.copy(), np.zeros_like(x))
-    verdict, all_iterations, all_fallbacks = solver.NOT_CONVERGED, 0, 0
-    shape = x.copy()
-    while verdict != solver.DONE and load_steps <= MOST_LOAD_STEPS:
-        shape = x.copy()
-        run_kernel(schemes.start_step, axes, holds, np.inf)
-        for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
-            verdict, iterations, fallbacks = run_kernel(
-                *(solver.newton, axes, hose, stage, holds, 1.0, loads, scale, limits, shape, work)
-            )
-            all_iterations += iterations
-            all_fallbacks += fallbacks
-            if verdict != solver.DONE:
-                break
-        load_steps *= 2
-    return Equilibrium(verdict, shape, all_iterations, all_fallbacks)
-
-
-def accept(
-    axes: tuple[float, ...],
-    hose: solver.Hose,
-    holds: solver.Holds,
-    state: schemes.State,
-    work: solver.Work,
-) -> None:
-    """Ends a static solve like a step: holds have moved, twist and frames are what was found."""
-    holds.multipliers[:] = work.multipliers[: len(holds.multipliers)]
-    holds.before[:] = holds.after
-    if len(axes) == 3:
-        run_kernel(twist.accept_twist, axes, holds.twist, state.x)
-    elif len(axes) == 4:
-        run_kernel(frames.accept_frames, axes, hose, holds, state, work.span)
 
 
 def build_tangent(

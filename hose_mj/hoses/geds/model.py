@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.geds import mechanics, schemes, solver
+from hose_mj.hoses.geds import mechanics, schemes, solver, statics
 from hose_mj.hoses.geds.body import SplineBody
 from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.loads import LoadSet
@@ -167,16 +167,21 @@ class GedsHose(SplineBody):
         arc_length: float,
         position: ArrayLike | None = None,
         tangent: ArrayLike | None = None,
+        director: ArrayLike | None = None,
     ) -> Hold:
-        """Holds a point and the direction of the tangent there; by default where they are now.
+        """Holds a point, the tangent and the material's angle there; by default where they are now.
 
-        Position (3,) m and tangent (3,), of any length above 0, are in the world frame; raises
-        `InputError` for a place off the hose or taken, and for vectors out of a planar hose's
-        plane.
+        Position (3,) m, tangent (3,) and director (3,), of any length above 0, are in the world
+        frame; the director is where m1 is to point, its part along the tangent ignored, reached by
+        a turn of less than half. Raises `InputError` for a place off the hose or taken, and for
+        vectors out of a planar hose's plane.
         """
         place = self._spline.check_place(arc_length)
         aim = self._spline.check_direction(self.tangent(place)[0] if tangent is None else tangent)
+        across = None if director is None else self._holds.check_director(director, aim)
         hold = self._holds.add(arc_length, position, aim, self._state.x)
+        if across is not None:
+            self._holds.turn_to(hold, across, self._state.x)
         self._renew_work()
         return hold
 
@@ -261,8 +266,8 @@ class GedsHose(SplineBody):
             InputError: load_steps is not a whole number from 1 to 64.
             StepError: no equilibrium was found; the state before is kept.
         """
-        check_count("load_steps", load_steps, 1, mechanics.MOST_LOAD_STEPS)
-        found = mechanics.find_equilibrium(
+        check_count("load_steps", load_steps, 1, statics.MOST_LOAD_STEPS)
+        found = statics.find_equilibrium(
             *(self._axes, self._hose, self._holds.rows, self._loads.loads),
             *(self._state.x, self._work, int(load_steps)),
         )
@@ -272,7 +277,7 @@ class GedsHose(SplineBody):
             raise StepError(f"no static equilibrium was found: {solver.VERDICTS[found.verdict]}")
         self._state = schemes.make_state(self._spline.size)
         self._state.x[:] = found.x
-        mechanics.accept(self._axes, self._hose, self._holds.rows, self._state, self._work)
+        statics.accept(self._axes, self._hose, self._holds.rows, self._state, self._work)
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and hold rows in the control points' n d coordinates."""

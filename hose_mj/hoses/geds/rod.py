@@ -62,7 +62,7 @@ def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-de
 def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
     """Moves the frame of Gauss point g and returns K1, K2 and the twist there.
 
-    Writes their derivatives by (a, theta') and (b, theta) to p.strains.
+    Writes their derivatives by (a, theta') and (b, theta) to p.strains, m1 and m2 to p.directors.
     """
     a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
     b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
@@ -76,6 +76,8 @@ def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
     u1 = cosine * d1 + sine * (t2 * d0 - t0 * d2)
     u2 = cosine * d2 + sine * (t0 * d1 - t1 * d0)
     v0, v1, v2 = t1 * u2 - t2 * u1, t2 * u0 - t0 * u2, t0 * u1 - t1 * u0
+    p.directors[0, 0], p.directors[0, 1], p.directors[0, 2] = u0, u1, u2
+    p.directors[1, 0], p.directors[1, 1], p.directors[1, 2] = v0, v1, v2
     k0 = (a1 * b2 - a2 * b1) * inverse
     k1 = (a2 * b0 - a0 * b2) * inverse
     k2 = (a0 * b1 - a1 * b0) * inverse
@@ -167,13 +169,18 @@ def _add_second_derivatives(frames, f, g, s0, s1, s2, p):  # type: ignore[no-unt
     b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
     inverse = 1.0 / max(a0 * a0 + a1 * a1 + a2 * a2, SMALLEST_A)
     t0, t1, t2 = frames[f, 0], frames[f, 1], frames[f, 2]
-    d0, d1, d2 = frames[f, 6], frames[f, 7], frames[f, 8]
-    cosine, sine = np.cos(p.b[g, 3]), np.sin(p.b[g, 3])
-    # W and V = t x W: d and t x d turned by theta, scaled by the stresses.
-    along, across = s0 * cosine - s1 * sine, s0 * sine + s1 * cosine
-    e0, e1, e2 = t1 * d2 - t2 * d1, t2 * d0 - t0 * d2, t0 * d1 - t1 * d0
-    w0, w1, w2 = along * d0 + across * e0, along * d1 + across * e1, along * d2 + across * e2
-    v0, v1, v2 = along * e0 - across * d0, along * e1 - across * d1, along * e2 - across * d2
+    m = p.directors
+    # W and V = t x W.
+    w0, w1, w2 = (
+        s0 * m[0, 0] + s1 * m[1, 0],
+        s0 * m[0, 1] + s1 * m[1, 1],
+        s0 * m[0, 2] + s1 * m[1, 2],
+    )
+    v0, v1, v2 = (
+        s0 * m[1, 0] - s1 * m[0, 0],
+        s0 * m[1, 1] - s1 * m[0, 1],
+        s0 * m[1, 2] - s1 * m[0, 2],
+    )
     k0 = (a1 * b2 - a2 * b1) * inverse
     k1 = (a2 * b0 - a0 * b2) * inverse
     k2 = (a0 * b1 - a1 * b0) * inverse

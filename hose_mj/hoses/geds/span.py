@@ -51,6 +51,7 @@ class Span(NamedTuple):
         force: derivatives of the energy by a and by b, (3, 2, 4).
         stiffness: its second derivatives for coordinates (c1, c2), (4, 4, 12), in the order of
             `Tables.products`: by (a, a), (a, b), (b, a), (b, b) at each Gauss point.
+        directors: m1 and m2 at the Gauss point at hand, (2, 3).
         strains: derivatives of K1, K2 and the twist by a and by b, (3, 2, 4).
         modes: derivatives of the mean and the linear strain by the control points, (2, 3, 4).
         stretches: |a| and its first two derivatives by A, (3, 3), Gauss point first.
@@ -63,6 +64,7 @@ class Span(NamedTuple):
     b_rate: Array
     force: Array
     stiffness: Array
+    directors: Array
     strains: Array
     modes: Array
     stretches: Array
@@ -79,6 +81,7 @@ def make_span():  # type: ignore[no-untyped-def]
         np.zeros((3, 4)),
         np.zeros((3, 2, 4)),
         np.zeros((4, 4, 12)),
+        np.zeros((2, 3)),
         np.zeros((3, 2, 4)),
         np.zeros((2, 3, 4)),
         np.zeros((3, 3)),

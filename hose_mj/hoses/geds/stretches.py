@@ -77,13 +77,6 @@ def make_directors(spline: Spline, arc_lengths: Array, x: Array) -> Array:
     return directors
 
 
-def find_first_tangent(spline: Spline, hose: solver.Hose, x: Array) -> Array:
-    """Returns the unit tangent (3,) at the first Gauss point."""
-    points = spline.to_world(x)[:4]
-    slope = hose.tables.first[0, 0] @ points
-    return np.asarray(slope / max(float(np.linalg.norm(slope)), 1e-12))
-
-
 def find_normal(tangent: Array) -> Array:
     """Returns some unit vector (3,) normal to a unit tangent (3,)."""
     away = np.eye(3)[int(np.argmin(np.abs(tangent)))]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.validation import numerics
+from hose_mj.validation import numerics, twist_checks
 from hose_mj.validation.case import Case
 from hose_mj.validation.compare import (
     CaseResult,
@@ -89,6 +89,7 @@ def _run_numerics(study: Study, rng: np.random.Generator, advance: Callable[[str
         ("Error of the swing over the span length", numerics.check_swing_order),
         ("Error over the time step", numerics.check_time_order),
         ("Wall time of a step over the control points", numerics.check_cost),
+        ("Wall time of a step with twist", twist_checks.check_twist_cost),
     ):
         advance(title)
         checks, study.curves[title] = measure()
@@ -98,6 +99,10 @@ def _run_numerics(study: Study, rng: np.random.Generator, advance: Callable[[str
     advance("energy")
     checks, study.energy = numerics.check_energy()
     study.checks += checks
+    advance("twist")
+    study.checks += twist_checks.check_turns()
+    study.checks += twist_checks.check_precession()
+    study.checks += twist_checks.check_agreement()
     advance("suture thread")
     study.checks += numerics.check_suture()
     wanted = N_RANDOM_STATES_QUICK if study.quick else N_RANDOM_STATES

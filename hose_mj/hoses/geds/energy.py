@@ -250,4 +250,4 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
     if len(axes) == 4:
         move_clamp_frames(axes, twist, x)
     if len(axes) == 3:
-        close_stretches(twist, progress, tau, rate, gradient)
+        close_stretches(twist, np.isinf(step), progress, tau, rate, gradient)

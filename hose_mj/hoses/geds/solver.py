@@ -469,7 +469,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
                 shorter = factor * min(max(slope / (slope - turned), 0.1), 0.7)
                 for k in range(size):
                     x[k] += (shorter - factor) * work.step[k]
-                predict_twist(holds.twist, in_statics, shorter - factor, work.step)
+                predict_twist(holds.twist, shorter - factor, work.step)
                 factor = shorter
                 shortened += 1
                 continue
@@ -506,7 +506,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
                 factor = limits.rotation_cap / turn
         for k in range(size):
             x[k] += factor * work.step[k]
-        predict_twist(holds.twist, in_statics, factor, work.step)
+        predict_twist(holds.twist, factor, work.step)
         if factor == 1.0 and largest <= limits.tolerance:
             return DONE, iteration, fallbacks
         if iteration == limits.max_iterations:

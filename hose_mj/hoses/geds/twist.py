@@ -187,8 +187,11 @@ def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-d
 
 
 @kernel
-def find_angle(twist, k):  # type: ignore[no-untyped-def]
-    """Sets twist.trial of stretch k, whose director has come to the last clamp."""
+def find_angle(twist, k, near):  # type: ignore[no-untyped-def]
+    """Sets twist.trial of stretch k, whose director has come to the last clamp.
+
+    Of all angles that differ by whole turns it is the one closest to `near`.
+    """
     last = twist.ends[k, 1]
     t0, t1, t2 = twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2]
     d0, d1, d2 = twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5]
@@ -196,22 +199,26 @@ def find_angle(twist, k):  # type: ignore[no-untyped-def]
     across = t0 * (d1 * e2 - d2 * e1) + t1 * (d2 * e0 - d0 * e2) + t2 * (d0 * e1 - d1 * e0)
     angle = np.arctan2(across, d0 * e0 + d1 * e1 + d2 * e2) - twist.carried[k, 6]
     turn = 2.0 * np.pi
-    twist.trial[k] = angle + turn * np.round((twist.trial[k] - angle) / turn)
+    twist.trial[k] = angle + turn * np.round((near - angle) / turn)
 
 
 @kernel
-def close_stretches(twist, fraction, tau, rate, gradient):  # type: ignore[no-untyped-def]
+def close_stretches(twist, in_statics, fraction, tau, rate, gradient):  # type: ignore[no-untyped-def]
     """Finds Phi and the moment of each stretch, and adds the moment's force to the gradient.
+
+    A time step changes Phi by less than half a turn, however its iterates stray. A static solve may
+    go far, but its iterates are capped: there Phi is foreseen from the one before.
 
     Args:
         twist: after `add_twist` of all spans.
+        in_statics: True in a static solve.
         fraction: of the clamps' spin that is done.
         tau: Kelvin-Voigt relaxation time (s).
         rate: velocity of the unknowns; read only where tau is not 0.
         gradient: added to.
     """
     for k in range(len(twist.angle)):
-        find_angle(twist, k)
+        find_angle(twist, k, twist.trial[k] if in_statics else twist.angle[k])
         first, last = twist.ends[k, 0], twist.ends[k, 1]
         angle = twist.trial[k] + fraction * (twist.spin[last, 0] - twist.spin[first, 0])
         if tau != 0.0:
@@ -225,18 +232,11 @@ def close_stretches(twist, fraction, tau, rate, gradient):  # type: ignore[no-un
 
 
 @kernel
-def predict_twist(twist, in_statics, factor, step):  # type: ignore[no-untyped-def]
-    """Foresees Phi after the shape has moved by factor times step, so that no turn is lost.
-
-    A time step changes Phi by less than half a turn, however its iterates stray; a static solve may
-    go far, but its iterates are capped.
-    """
+def predict_twist(twist, factor, step):  # type: ignore[no-untyped-def]
+    """Foresees Phi after the shape has moved by factor times step."""
     for k in range(len(twist.angle)):
-        if in_statics:
-            for i in range(len(step)):
-                twist.trial[k] += factor * twist.rows[k, i] * step[i]
-        else:
-            twist.trial[k] = twist.angle[k]
+        for i in range(len(step)):
+            twist.trial[k] += factor * twist.rows[k, i] * step[i]
 
 
 @kernel
@@ -266,4 +266,4 @@ def measure_twist(axes, tables, twist, x, p):  # type: ignore[no-untyped-def]
             compute_derivatives(axes, tables, e, g, x, p.a, p.b)
         add_twist(axes, tables, twist, e, 0.0, x, p)
     for k in range(len(twist.angle)):
-        find_angle(twist, k)
+        find_angle(twist, k, twist.trial[k])

@@ -25,7 +25,14 @@ from hose_mj.hoses.chain_holds import (
     stack_rows,
 )
 from hose_mj.hoses.chain_kind import ChainKind
-from hose_mj.hoses.chain_layout import ChainLayout, rotation_matrix, transport_frames, turn_frame
+from hose_mj.hoses.chain_layout import (
+    ChainLayout,
+    exponential,
+    multiply,
+    rotation_matrix,
+    transport_frames,
+    turn_frame,
+)
 from hose_mj.hoses.chain_model import ChainModel
 from hose_mj.hoses.chain_settings import ChainSettings
 from hose_mj.hoses.inputs import (
@@ -37,7 +44,7 @@ from hose_mj.hoses.inputs import (
     sample_velocity,
 )
 from hose_mj.hoses.model import Array, Curve, Energies, Hold, Linearization, Momentum, Reaction
-from hose_mj.hoses.spec import HoseSpec
+from hose_mj.hoses.spec import HoseSpec, check_number
 
 
 class MujocoChainHose:
@@ -125,7 +132,7 @@ class MujocoChainHose:
         position: ArrayLike | None = None,
         tangent: ArrayLike | None = None,
     ) -> Hold:
-        """Holds a point, the tangent there, and (the cable's) twist; by default where they are.
+        """Holds a point, the tangent and (the cable's) twist there; by default where they are.
 
         At s = 0 the first segment becomes part of the world until the clamp is moved, elsewhere a
         weld holds the segment. A clamp holds a whole segment: see `ChainLayout`.
@@ -145,23 +152,35 @@ class MujocoChainHose:
         return self._add_hold(s, where, np.array([1.0, 0.0, 0.0, 0.0]), fixes_tangent=False)
 
     def move(
-        self, hold: Hold, position: ArrayLike | None = None, tangent: ArrayLike | None = None
+        self,
+        hold: Hold,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+        spin: float = 0.0,
     ) -> None:
-        """Sets where a hold is to be at the end of the next step.
+        """Sets where a hold is to be at the end of the next step; see `HoseModel.move`.
 
         A clamp at s = 0 that moves becomes a weld: MuJoCo takes a moved fixed body's children along
-        without inertia.
+        without inertia. Turns are kept while every joint twists by less than pi.
+
+        Raises:
+            InputError: a tangent or spin for an attachment, a spin for a hose without twist, or
+                spins that add up to pi or more in one step: a weld would go the shorter way.
         """
         place = self._find(hold)
         held = self._held[place]
         where, frame = held.position, held.frame
         if position is not None:
             where = self._check_target(hold.arc_length, position)
+        if not hold.fixes_tangent and (tangent is not None or spin != 0.0):
+            name, value = ("spin", spin) if tangent is None else ("tangent", tangent)
+            raise InputError(f"{name} of an attachment", value, "only a clamp's to set")
         if tangent is not None:
-            if not hold.fixes_tangent:
-                raise InputError("tangent of an attachment", tangent, "None: only a clamp has one")
             frame = turn_frame(frame, self._check_tangent(tangent))
-        moved = replace(held, position=where, frame=frame)
+        spun = held.spun + self._check_spin(held, spin)
+        if spin != 0.0:
+            frame = multiply(exponential(spin * rotation_matrix(frame)[:, 0]), frame)
+        moved = replace(held, position=where, frame=frame, spun=spun)
         if held.rigid and (np.any(where != held.position) or np.any(frame != held.frame)):
             moved = replace(moved, rigid=False)
             start = replace(held, rigid=False)
@@ -224,6 +243,7 @@ class MujocoChainHose:
             StepError: no equilibrium was found; the state before is kept.
         """
         self._chain.settle(self._held, self._loads)
+        self._held = [held.arrived() for held in self._held]
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and constraints at rest.
@@ -259,6 +279,26 @@ class MujocoChainHose:
         on_rest = self.data.cfrc_int[self._chain.bodies[1:], 3:]
         return self.layout.interpolate(s, -np.einsum("ni,ni->n", on_rest, tangents))
 
+    def twist(self, arc_length: ArrayLike) -> Array:
+        """Turn of the joints about the tangent over h (k,), rad/m; between and beyond, as above."""
+        s = self._arc_lengths(arc_length)
+        turns = self._chain.motion().joint_rotations()[:, 0]
+        return self.layout.interpolate(s, turns / self.layout.segment_length)
+
+    def torque(self, arc_length: ArrayLike) -> Array:
+        """Moment about the tangent in the joints (k,), N m; between and beyond, as above.
+
+        Damping included; about the mean of the two segments' tangents.
+        """
+        s = self._arc_lengths(arc_length)
+        self._chain.update_forces(self._loads)
+        bodies, motion = self._chain.bodies, self._chain.motion()
+        wrenches = self.data.cfrc_int[bodies[1:]]
+        arms = self.data.subtree_com[bodies[0]] - motion.starts[1:]
+        on_rest = wrenches[:, :3] + np.cross(arms, wrenches[:, 3:])
+        tangents = motion.tangent(self.layout.nodes[1:-1])
+        return self.layout.interpolate(s, -np.einsum("ni,ni->n", on_rest, tangents))
+
     def energies(self) -> Energies:
         """Energies at the present state; `stretching` is 0."""
         gravity = self.model.opt.gravity
@@ -271,7 +311,7 @@ class MujocoChainHose:
     # State in and out.
 
     def snapshot(self) -> dict[str, Any]:
-        """Holds (k, 11), loads (k, 7), the next hold's number and MuJoCo's integration state."""
+        """Holds (k, 19), loads (k, 7), the next hold's number and MuJoCo's integration state."""
         return {
             "holds": stack_rows(self._held, Held.WIDTH),
             "loads": stack_rows(self._loads, Load.WIDTH),
@@ -311,6 +351,15 @@ class MujocoChainHose:
             raise InputError("tangent", tangent, "a vector that is not zero")
         self._kind.check_tangent(direction / length)
         return np.asarray(direction / length)
+
+    def _check_spin(self, held: Held, spin: float) -> float:
+        """Returns a spin (rad) that is finite, possible here and below pi with those before."""
+        check_number("spin", spin, may_be_zero=True, may_be_negative=True)
+        if spin != 0.0 and not self._kind.twists:
+            raise InputError("spin", spin, f"0 for a {type(self).__name__}, which has no twist")
+        if abs(held.spun + spin) >= np.pi:
+            raise InputError("spin", spin, "turns (rad) that add up to less than pi in one step")
+        return spin
 
     def _find(self, hold: Hold) -> int:
         """Place of a hold among those that act now."""

@@ -22,15 +22,14 @@ from hose_mj.hoses.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.chain_settings import ChainSettings
 from hose_mj.hoses.chain_statics import (
     BodyPoint,
+    ChainSystem,
     StaticChain,
     StaticHold,
     StaticLoad,
-    StaticSystem,
-    linearize,
-    solve_equilibrium,
 )
 from hose_mj.hoses.model import Array, Energies, Linearization, Momentum, Reaction
 from hose_mj.hoses.mujoco_model import Motion, MujocoModel
+from hose_mj.hoses.mujoco_statics import linearize, solve_equilibrium
 from hose_mj.hoses.spec import HoseSpec
 
 _ADVICE = (
@@ -237,7 +236,7 @@ class ChainModel(MujocoModel):
             self.data.xfrc_applied[point.body, :3] += load.force
             self.data.xfrc_applied[point.body, 3:] += load.moment + np.cross(arm, load.force)
 
-    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> StaticSystem:
+    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> ChainSystem:
         """The equations of equilibrium from the present pose on."""
         holds = [
             StaticHold(
@@ -251,4 +250,4 @@ class ChainModel(MujocoModel):
         forces = [StaticLoad(self.point(x.arc_length), x.force, x.moment) for x in loads]
         chain = StaticChain(self.kind, self.model, self.bodies, self.rooted, self.layout)
         motion = self.motion()
-        return StaticSystem(chain, motion.starts[0], motion.frames, holds, forces)
+        return ChainSystem(chain, motion.starts[0], motion.frames, holds, forces)

@@ -298,7 +298,7 @@ class MujocoHose(ABC):
         if position is None:
             return np.asarray(self.position(arc_length)[0])
         where = check_vector("position", position)
-        return self._check_points("position", where[None])[0]
+        return np.asarray(self._check_points("position", where[None])[0])
 
     def _check_tangent(self, tangent: ArrayLike) -> Array:
         direction = check_vector("tangent", tangent)

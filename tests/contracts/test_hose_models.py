@@ -12,9 +12,14 @@ from hose_mj.hoses.registry import MODELS, make_hose
 from hose_mj.hoses.spec import HoseSpec
 
 LENGTH, DENSITY, WEIGHT = 1.0, 0.1, 0.1 * 9.81
-SMALL = {"geds": {"control_points": 10}, "cable": {"segments": 10}, "hinge-chain": {"segments": 10}}
+SMALL = {
+    "geds": {"control_points": 10},
+    "cable": {"segments": 10},
+    "hinge-chain": {"segments": 10},
+    "flex": {"segments": 20},
+}
 """Options that make a model small; a model without an entry runs as it is by default."""
-WITHOUT_TWIST = {"hinge-chain"}
+WITHOUT_TWIST = {"flex", "hinge-chain"}
 ARC_LENGTHS = np.array([0.0, 0.31, 0.5, 1.0])
 
 

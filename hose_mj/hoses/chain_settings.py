@@ -72,12 +72,16 @@ class ChainSettings:
 
     @property
     def lead(self) -> float:
-        """Steps by which a moving target must run ahead for a hold to be in time."""
+        """Steps by which a moving target must run ahead for a hold to be in time.
+
+        The integrator "discrete" lets a hold see the position that the step ends with, but not
+        where its target will be then: one step more.
+        """
         first, second = self._solref
         damping, stiffness = -second, -first
         if first > 0:
             damping, stiffness = 2 / first, 1 / (first * second) ** 2
-        return damping / (stiffness * self.timestep) - 1.0
+        return damping / (stiffness * self.timestep) - (self.integrator != "discrete")
 
     @property
     def _solref(self) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.hoses.chain_holds import Held
-from hose_mj.hoses.flex_layout import FlexLayout, interpolate
+from hose_mj.hoses.flex_layout import FlexLayout
 from hose_mj.hoses.flex_model import FlexModel, FlexSettings
 from hose_mj.hoses.model import Array
 from hose_mj.hoses.mujoco_chain import check_plain
@@ -92,11 +92,9 @@ class FlexHose(MujocoHose):
         """Arc lengths of the vertices; another one after each change of holds."""
         return self._model.layout
 
-    def stretch(self, arc_length: ArrayLike) -> Array:
-        """Strain of the edges (k,), which should be 0: straight lines between their middles."""
-        s = self._arc_lengths(arc_length)
-        middles = (self.layout.nodes[:-1] + self.layout.nodes[1:]) / 2
-        return interpolate(s, middles, self._model.motion().stretch())
+    def stretch(self) -> Array:
+        """Strain of the edges (N,); 0 if MuJoCo's constraints were rigid."""
+        return self._model.motion().stretch()
 
     def _make_model(self, held: Sequence[Held]) -> FlexModel:
         return FlexModel(self.spec, self.settings, held)

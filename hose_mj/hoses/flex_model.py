@@ -20,6 +20,9 @@ from hose_mj.hoses.mujoco_model import Motion, MujocoModel
 from hose_mj.hoses.mujoco_statics import linearize, solve_equilibrium
 from hose_mj.hoses.spec import HoseSpec
 
+_BALLAST = 10.0
+"""Inertia of a held vertex beside its own, over the mass of the hose. It has no weight, and its
+forces are taken off reactions: a soft constraint that holds much inertia gives less."""
 _ADVICE = "try a smaller timestep, or softer edges and holds"
 
 
@@ -75,9 +78,12 @@ class FlexModel(MujocoModel):
         self._rest = np.zeros((len(self.masses), 3))
         self._rest[:, 0] = self.layout.nodes
         maker = _make_rod(spec, settings, self._rest, self.masses)
+        self._ballast = _BALLAST * spec.mass
         for item in held:
             for vertex in self.layout.find_vertices(item.hold):
                 _add_connect(maker, item, vertex, settings.hold_options())
+                for joint in maker.body(f"v{vertex}").joints:
+                    joint.armature = self._ballast
         super().__init__(maker.compile(), settings.lead, _ADVICE)
         self._scratch = mujoco.MjData(self.model)
         self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.masses))])
@@ -151,8 +157,9 @@ class FlexModel(MujocoModel):
     def reaction(self, held: Held) -> Reaction:
         """Sum of what the constraints of a hold do to its vertices."""
         vertices = self.layout.find_vertices(held.hold)
-        forces = np.concatenate([self._find_rows(_name(held, vertex)) for vertex in vertices])
-        return self._add_up(held, forces.reshape(-1, 3))
+        forces = np.stack([self._find_rows(_name(held, vertex)) for vertex in vertices])
+        forces -= self._ballast * self.data.qacc.reshape(-1, 3)[vertices]
+        return self._add_up(held, forces)
 
     def tension(self, arc_lengths: Array) -> Array:
         """Tension of the edges, straight lines between and beyond their middles.

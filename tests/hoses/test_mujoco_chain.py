@@ -356,6 +356,18 @@ def test_registry_names_what_is_wrong():
         make_hose("cable", make_spec())
 
 
+def test_discrete_holds_follow_a_steady_motion_in_time():
+    # Without the step that the integrator needs more, the end would be .4 mm late.
+    spec = make_spec(damping_time=0.02)
+    hose = make("hinge-chain", timestep=1e-3, integrator="discrete", spec=spec)
+    hose.attach(0.0)
+    end = hose.attach(1.0)
+    for k in range(1, 201):
+        hose.move(end, [1 - 4e-4 * k, 0, 0])
+        hose.step()
+    np.testing.assert_allclose(hose.position(1.0)[0], [0.92, 0, 0], atol=2e-5)
+
+
 # -- twist --------------------------------------------------------------------------------------
 
 

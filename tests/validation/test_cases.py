@@ -14,7 +14,7 @@ from hose_mj.validation.settings import FULL, QUICK, Setting, list_ladders, list
 STATIC = [case for case in CASES if case.motion is None]
 DYNAMIC = [case for case in CASES if case.motion is not None]
 PAIRS = [(case, model) for case in CASES for model in case.models]
-COARSE = {"geds": 12, "cable": 10, "hinge-chain": 10}
+COARSE = {"geds": 12, "cable": 10, "flex": 10, "hinge-chain": 10}
 
 
 def name(value):

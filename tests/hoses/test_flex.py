@@ -229,20 +229,22 @@ def test_frequencies():
 
 
 def test_the_first_mode_swings_at_its_frequency():
-    # By MuJoCo's own steps: the tip of a released cantilever crosses its mean at quarter periods.
-    hose = make(segments=20, timestep=2e-4, gravity=(0, 0, 0))
+    # By MuJoCo's own steps: a cantilever let go of swings through zero twice a period. Of its bend
+    # under a tip load 97 % are in the first mode.
+    hose = make(segments=20, bending_stiffness=5.0, timestep=2e-4, gravity=(0, 0, 0))
     hose.clamp(0.0)
-    hose.apply_force(1.0, [0, 0, 1e-3])
+    hose.apply_force(1.0, [0, 0, 1e-1])
     hose.solve_static()
     hose.clear_loads()
     heights = []
-    for _ in range(6000):
+    for _ in range(4000):
         hose.step()
         heights.append(hose.position(1.0)[0, 2])
-    signs = np.flatnonzero(np.diff(np.sign(heights)) != 0)
-    found = math.pi / (np.diff(signs[::2]).mean() / 2 * 2e-4)
-    wanted = reference.beam_frequencies("clamped-free")[0] * math.sqrt(EI / DENSITY)
-    assert found == pytest.approx(wanted, rel=2e-2)
+    crossings = 2e-4 * np.flatnonzero(np.diff(np.sign(heights)) != 0)
+    assert len(crossings) > 5
+    found = math.pi * (len(crossings) - 1) / (crossings[-1] - crossings[0])
+    wanted = reference.beam_frequencies("clamped-free")[0] * math.sqrt(5.0 / DENSITY)
+    assert found == pytest.approx(wanted, rel=1e-2)
 
 
 def test_a_vertical_hose_carries_its_weight():
@@ -262,7 +264,7 @@ def test_a_vertical_hose_carries_its_weight():
 
 
 def test_large_steps_are_stable_with_stiff_bending():
-    # Explicit forces would need about dt < h^2 sqrt(rho / EI) / 4 = 2e-5 s.
+    # Explicit forces would need dt < h^2 sqrt(rho / EI) / 2 = 4e-5 s.
     hose = make(segments=40, timestep=5e-3, bending_stiffness=5.0, damping_time=1e-3)
     hose.clamp(0.0)
     hose.step(400)

@@ -192,7 +192,9 @@ def run_ladder(
     skipped: list[Skipped] = []
     for setting in ladder:
         if setting.model != "geds" and outcomes:
-            if _is_exhausted(outcomes) or len(outcomes) == grid.longest_ladder:
+            flex = setting.model == "flex"
+            most = grid.longest_flex_ladder if flex else grid.longest_ladder
+            if _is_exhausted(outcomes) or len(outcomes) == most:
                 break
             last = outcomes[-1].setting.timestep
             assert setting.timestep is not None

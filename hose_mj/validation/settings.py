@@ -89,6 +89,7 @@ class Grid:
         schemes: integrators of motions, by model.
         smallest_geds_step: GEDS's time steps end here (s).
         longest_ladder: at most so many time steps of a chain's resolution are scored.
+        longest_flex_ladder: the same for the flex, which is stable from the largest step on.
         longest_run: a run that would take longer is left out (s).
         longest_timed_run: a run that took longer is not timed again (s).
         rounds: how often a short run is timed, all models in turn; the least counts.
@@ -100,6 +101,7 @@ class Grid:
     schemes: dict[str, tuple[str, ...]]
     smallest_geds_step: float
     longest_ladder: int
+    longest_flex_ladder: int
     longest_run: float
     longest_timed_run: float
     rounds: int
@@ -128,6 +130,7 @@ FULL = Grid(
     schemes=_SCHEMES,
     smallest_geds_step=0.0,
     longest_ladder=20,
+    longest_flex_ladder=20,
     longest_run=15.0,
     longest_timed_run=2.0,
     rounds=5,
@@ -138,12 +141,13 @@ QUICK = Grid(
     dynamic={
         "geds": (8, 12, 13, 16),
         "cable": (20, 40),
-        "flex": (20, 40, 80),
+        "flex": (20, 40),
         "hinge-chain": (20, 40),
     },
     schemes=_SCHEMES | {"hinge-chain": ("euler", "rk4")},
     smallest_geds_step=0.9e-3,
     longest_ladder=3,
+    longest_flex_ladder=6,
     longest_run=1.3,
     longest_timed_run=0.6,
     rounds=2,

@@ -139,7 +139,7 @@ def test_geds_with_20_control_points_is_within_a_thousandth(case):
 
 
 @pytest.mark.parametrize("gamma", [1, 10])
-@pytest.mark.parametrize("model", INEXTENSIBLE)
+@pytest.mark.parametrize("model", ["cable", "hinge-chain"])
 def test_mujocos_documented_clamp_has_the_published_errors(model, gamma):
     """A whole rigid first segment: -19 / -9.7 / -5 % with 10 / 20 / 40 segments."""
     (case,) = find_cases((f"heavy-cantilever-gamma-{gamma}",))

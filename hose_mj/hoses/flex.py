@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from hose_mj.hoses.chain_holds import Held
 from hose_mj.hoses.flex_layout import FlexLayout
-from hose_mj.hoses.flex_model import FlexModel, FlexSettings
+from hose_mj.hoses.flex_model import FlexModel
+from hose_mj.hoses.flex_rod import FlexSettings
 from hose_mj.hoses.model import Array
 from hose_mj.hoses.mujoco_chain import check_plain
 from hose_mj.hoses.mujoco_hose import MujocoHose
@@ -32,7 +33,7 @@ class FlexHose(MujocoHose):
         spec: what the hose is made of.
         timestep: length of one step (s).
         gravity: (3,) m/s^2.
-        segments: number of edges, at least 3; holds that are no vertex may change it by a few.
+        segments: number of edges, at least 2; holds that are no vertex may change it by a few.
         clamp_correction: False for a clamp at an end that holds the first two vertices; True
             centres them on the end.
         iterations: most iterations of MuJoCo's constraint solver.

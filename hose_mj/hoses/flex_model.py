@@ -2,53 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from hose_mj.hoses.chain_holds import Held, Load
 from hose_mj.hoses.chain_layout import rotation_matrix
-from hose_mj.hoses.chain_settings import ChainSettings, check_numbers, check_solref
 from hose_mj.hoses.flex_layout import FlexLayout, interpolate
 from hose_mj.hoses.flex_motion import FlexMotion
+from hose_mj.hoses.flex_rod import BALLAST, FlexSettings, add_connect, make_rod, name_hold
 from hose_mj.hoses.flex_statics import FlexProblem, FlexSystem, spread_loads
 from hose_mj.hoses.model import Array, Energies, Linearization, Momentum, Reaction
 from hose_mj.hoses.mujoco_model import Motion, MujocoModel
 from hose_mj.hoses.mujoco_statics import linearize, solve_equilibrium
 from hose_mj.hoses.spec import HoseSpec
 
-_BALLAST = 10.0
-"""Inertia of a held vertex beside its own, over the mass of the hose. It has no weight, and its
-forces are taken off reactions: a soft constraint that holds much inertia gives less."""
 _ADVICE = "try a smaller timestep, or softer edges and holds"
-
-
-@dataclass(frozen=True, kw_only=True)
-class FlexSettings(ChainSettings):
-    """Settings of a flex rod.
-
-    Attributes:
-        edge_solref: MuJoCo's solref of the edges; None for that of holds.
-        edge_solimp: their solimp.
-    """
-
-    edge_solref: Sequence[float] | None
-    edge_solimp: Sequence[float]
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_solref("edge_solref", self.edge_solref)
-        check_numbers("edge_solimp", self.edge_solimp, 5)
-
-    def edge_options(self) -> dict[str, object]:
-        """solref and solimp of the edges."""
-        options = self.hold_options()
-        if self.edge_solref is not None:
-            options["solref"] = list(self.edge_solref)
-        return options | {"solimp": list(self.edge_solimp)}
 
 
 class FlexModel(MujocoModel):
@@ -77,13 +47,11 @@ class FlexModel(MujocoModel):
         self._bending_stiffness = spec.bending_stiffness
         self._rest = np.zeros((len(self.masses), 3))
         self._rest[:, 0] = self.layout.nodes
-        maker = _make_rod(spec, settings, self._rest, self.masses)
-        self._ballast = _BALLAST * spec.mass
+        maker = make_rod(spec, settings, self._rest, self.masses)
+        self._ballast = BALLAST * spec.mass
         for item in held:
             for vertex in self.layout.find_vertices(item.hold):
-                _add_connect(maker, item, vertex, settings.hold_options())
-                for joint in maker.body(f"v{vertex}").joints:
-                    joint.armature = self._ballast
+                add_connect(maker, item, vertex, self._ballast, settings.hold_options())
         super().__init__(maker.compile(), settings.lead, _ADVICE)
         self._scratch = mujoco.MjData(self.model)
         self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.masses))])
@@ -157,7 +125,7 @@ class FlexModel(MujocoModel):
     def reaction(self, held: Held) -> Reaction:
         """Sum of what the constraints of a hold do to its vertices."""
         vertices = self.layout.find_vertices(held.hold)
-        forces = np.stack([self._find_rows(_name(held, vertex)) for vertex in vertices])
+        forces = np.stack([self._find_rows(name_hold(held, vertex)) for vertex in vertices])
         forces -= self._ballast * self.data.qacc.reshape(-1, 3)[vertices]
         return self._add_up(held, forces)
 
@@ -187,7 +155,7 @@ class FlexModel(MujocoModel):
         for item in held:
             vertices = self.layout.find_vertices(item.hold)
             for vertex, where in zip(vertices, self._find_targets(item, lead), strict=True):
-                place = self.model.body(f"target-{_name(item, vertex)}").mocapid[0]
+                place = self.model.body(f"target-{name_hold(item, vertex)}").mocapid[0]
                 self.data.mocap_pos[place] = where
 
     def write_loads(self, loads: Sequence[Load]) -> None:
@@ -284,54 +252,3 @@ class FlexModel(MujocoModel):
             return Reaction(forces[0].copy(), np.zeros(3))
         arms = self._find_targets(held, 0.0) - held.position
         return Reaction(forces.sum(axis=0), np.cross(arms, forces).sum(axis=0))
-
-
-def _make_rod(spec: HoseSpec, settings: FlexSettings, rest: Array, masses: Array) -> mujoco.MjSpec:
-    """Vertices on slides, MuJoCo's bending between them, edges that keep their lengths.
-
-    MuJoCo multiplies `young` by the section of a solid cylinder of the flex's radius; `damping` is
-    the Kelvin-Voigt time.
-    """
-    maker = mujoco.MjSpec()
-    settings.apply(maker.option)
-    for k, (place, mass) in enumerate(zip(rest, masses, strict=True)):
-        body = maker.worldbody.add_body(name=f"v{k}", pos=place)
-        body.explicitinertial = True
-        body.mass, body.inertia = mass, [mass * spec.radius**2] * 3
-        for axis in np.eye(3):
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    rod = maker.add_flex(name="hose", dim=1, radius=spec.radius)
-    rod.contype, rod.conaffinity, rod.selfcollide = 0, 0, mujoco.mjtFlexSelf.mjFLEXSELF_NONE
-    rod.vertbody = [f"v{k}" for k in range(len(rest))]
-    rod.vert = [0.0] * (3 * len(rest))
-    rod.elem = [vertex for k in range(len(rest) - 1) for vertex in (k, k + 1)]
-    rod.young = spec.bending_stiffness / (math.pi * spec.radius**4 / 4)
-    rod.poisson, rod.damping = 0.0, spec.damping_time
-    maker.add_equality(
-        name="edges",
-        type=mujoco.mjtEq.mjEQ_FLEX,
-        objtype=mujoco.mjtObj.mjOBJ_FLEX,
-        name1="hose",
-        **settings.edge_options(),
-    )
-    return maker
-
-
-def _name(held: Held, vertex: int) -> str:
-    return f"hold{held.hold.number}-{vertex}"
-
-
-def _add_connect(maker: mujoco.MjSpec, held: Held, vertex: int, options: dict[str, object]) -> None:
-    """Ties a vertex to a mocap body."""
-    name = _name(held, vertex)
-    maker.body(f"v{vertex}").add_site(name=name)
-    target = maker.worldbody.add_body(name=f"target-{name}", mocap=True)
-    target.add_site(name=f"target-{name}")
-    maker.add_equality(
-        name=name,
-        type=mujoco.mjtEq.mjEQ_CONNECT,
-        objtype=mujoco.mjtObj.mjOBJ_SITE,
-        name1=name,
-        name2=f"target-{name}",
-        **options,
-    )

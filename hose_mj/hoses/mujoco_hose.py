@@ -6,12 +6,11 @@ anew and carries the state over.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -26,12 +25,13 @@ from hose_mj.hoses.inputs import (
     sample_curve,
     sample_velocity,
 )
-from hose_mj.hoses.model import Array, Curve, Energies, Hold, Linearization, Momentum, Reaction
+from hose_mj.hoses.model import Array, Curve, Hold, Linearization, Reaction
 from hose_mj.hoses.mujoco_model import MujocoModel
+from hose_mj.hoses.mujoco_queries import MujocoQueries
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 
-class MujocoHose(ABC):
+class MujocoHose(MujocoQueries):
     """The `HoseModel` protocol on top of a `MujocoModel`.
 
     Args:
@@ -64,21 +64,6 @@ class MujocoHose(ABC):
     def twists(self) -> bool:
         """Whether the hose can turn about its tangent against itself."""
         return False
-
-    @property
-    def time(self) -> float:
-        """Simulated time since the last reset (s)."""
-        return float(self.data.time)
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The mjModel; another one after each change of holds."""
-        return self._model.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """The mjData; another one after each change of holds."""
-        return self._model.data
 
     # Shape, holds and loads.
 
@@ -209,48 +194,6 @@ class MujocoHose(ABC):
         """Mass, tangent stiffness and constraints at rest, in the model's own coordinates."""
         return self._model.linearize(self._held, self._loads)
 
-    # Queries.
-
-    def position(self, arc_length: ArrayLike) -> Array:
-        """Centre line, shape (k, 3), m: straight between the nodes."""
-        return self._model.motion().position(self._arc_lengths(arc_length))
-
-    def velocity(self, arc_length: ArrayLike) -> Array:
-        """Velocity of the centre line, shape (k, 3), m/s."""
-        return self._model.motion().velocity(self._arc_lengths(arc_length))
-
-    def tangent(self, arc_length: ArrayLike) -> Array:
-        """Unit tangent, shape (k, 3): the segment's, at a node the mean of its neighbours'."""
-        return self._model.motion().tangent(self._arc_lengths(arc_length))
-
-    def curvature(self, arc_length: ArrayLike) -> Array:
-        """Bending per length at the nodes (k,), 1/m: straight lines between and beyond them."""
-        return self._model.motion().curvature(self._arc_lengths(arc_length))
-
-    def twist(self, arc_length: ArrayLike) -> Array:
-        """Turn about the tangent per length (k,), rad/m; between and beyond the nodes as above."""
-        return self._model.motion().twist(self._arc_lengths(arc_length))
-
-    def tension(self, arc_length: ArrayLike) -> Array:
-        """Axial force (k,), N, positive in tension; between where it is known as above."""
-        s = self._arc_lengths(arc_length)
-        self._model.update_forces(self._loads)
-        return self._model.tension(s)
-
-    def torque(self, arc_length: ArrayLike) -> Array:
-        """Moment about the tangent at the nodes (k,), N m; between and beyond as above."""
-        s = self._arc_lengths(arc_length)
-        self._model.update_forces(self._loads)
-        return self._model.torque(s)
-
-    def energies(self) -> Energies:
-        """Energies at the present state."""
-        return self._model.energies()
-
-    def momentum(self) -> Momentum:
-        """Linear and angular momentum at the present state."""
-        return self._model.momentum()
-
     # State in and out.
 
     def snapshot(self) -> dict[str, Any]:
@@ -289,9 +232,6 @@ class MujocoHose(ABC):
         return False
 
     # Details.
-
-    def _arc_lengths(self, arc_length: ArrayLike) -> Array:
-        return check_arc_lengths(arc_length, self.spec.length)
 
     def _check_target(self, arc_length: float, position: ArrayLike | None) -> Array:
         """Where a hold is to be; by default where its point is now."""

@@ -151,11 +151,10 @@ class ChainModel(MujocoModel):
         """
         if self._forces_known:
             return
-        self.write_loads([*loads, *self.settled.values()])
         flags = self.model.opt.disableflags
         if self.settled:
             self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
-        mujoco.mj_forward(self.model, self.data)
+        self.forward([*loads, *self.settled.values()])
         mujoco.mj_rnePostConstraint(self.model, self.data)
         self.model.opt.disableflags = flags
         self.write_loads(loads)

@@ -40,7 +40,7 @@ class FlexHose(MujocoHose):
         tolerance: its termination tolerance.
         jacobian: dense, sparse or auto; sparse took a tenth less time for a held rod of 20 edges
             and two thirds less for one of 80.
-        edge_solref: MuJoCo's solref of the edges; None for twice the time step, critically damped.
+        edge_solref: MuJoCo's solref of the edges; None for that of holds.
         edge_solimp: their solimp.
         hold_solref: solref of holds; None for twice the time step, critically damped.
         hold_solimp: their solimp.

@@ -117,8 +117,7 @@ class FlexModel(MujocoModel):
         """Computes the forces of edges and holds; after `settle` they are known."""
         if self._forces_known:
             return
-        self.write_loads(loads)
-        mujoco.mj_forward(self.model, self.data)
+        self.forward(loads)
         self._tensions = -self._find_rows("edges")
         self._forces_known = True
 

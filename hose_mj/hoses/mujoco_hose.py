@@ -197,22 +197,27 @@ class MujocoHose(MujocoQueries):
     # State in and out.
 
     def snapshot(self) -> dict[str, Any]:
-        """Holds (k, 19), loads (k, 7), the next hold's number and MuJoCo's integration state."""
+        """Holds (k, 19), loads (k, 7), the next hold's number and MuJoCo's integration state.
+
+        And that before the last step where it moved holds, for what is read off of their forces.
+        """
         return {
             "holds": stack_rows(self._held, Held.WIDTH),
             "loads": stack_rows(self._loads, Load.WIDTH),
             "next_number": self._next_number,
             "numbers": self._model.get_numbers(),
+            "replay": self._model.replay.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot of this hose."""
-        missing = {"holds", "loads", "next_number", "numbers"} - state.keys()
+        missing = {"holds", "loads", "next_number", "numbers", "replay"} - state.keys()
         if missing:
             raise InputError("state", sorted(state), f"a snapshot; {sorted(missing)} missing")
         held = [Held.from_numbers(row) for row in np.asarray(state["holds"])]
         made = self._make_model(held)
         made.set_numbers(np.asarray(state["numbers"]))
+        made.replay = np.asarray(state["replay"])
         self._model, self._held = made, held
         self._loads = [Load.from_numbers(row) for row in np.asarray(state["loads"])]
         self._next_number = int(state["next_number"])

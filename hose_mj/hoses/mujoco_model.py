@@ -71,6 +71,8 @@ class MujocoModel(ABC):
         self._lead, self._advice = lead, advice
         self._warnings = [self.data.warning[kind] for kind in _BAD]
         self._forces_known = False
+        # State before the last step where that moved holds; its targets are those of the data.
+        self._replay: Array | None = None
 
     # What each kind of hose says for itself.
 
@@ -161,6 +163,33 @@ class MujocoModel(ABC):
             raise InputError("size of the state", state.shape, "a snapshot of this very hose")
         mujoco.mj_setState(self.model, self.data, state, _STATE)
         self.forget()
+        self._replay = None
+
+    @property
+    def replay(self) -> Array:
+        """State before the last step where that moved holds, else of no size; for snapshots."""
+        return np.zeros(0) if self._replay is None else self._replay
+
+    @replay.setter
+    def replay(self, state: Array) -> None:
+        self._replay = state.copy() if len(state) else None
+
+    def forward(self, loads: Sequence[Load]) -> None:
+        """MuJoCo's forces for the present state or, where the last step moved holds, in that step.
+
+        Its targets run ahead, so what they would do from now on is not what they did.
+        """
+        if self._replay is None:
+            self.write_loads(loads)
+            mujoco.mj_forward(self.model, self.data)
+            return
+        now, data = self.get_numbers(), self.data
+        position, frame = data.mocap_pos.copy(), data.mocap_quat.copy()
+        mujoco.mj_setState(self.model, data, self._replay, _STATE)
+        data.mocap_pos[:], data.mocap_quat[:] = position, frame
+        self.write_loads(loads)
+        mujoco.mj_forward(self.model, data)
+        mujoco.mj_setState(self.model, data, now, _STATE)
 
     def keep_settled(self, multipliers: Array, held: Sequence[Held]) -> None:
         """Remembers the wrenches of the holds, in their order, as `solve_equilibrium` found them.
@@ -168,6 +197,7 @@ class MujocoModel(ABC):
         Six numbers for a clamp that is no root, three for an attachment.
         """
         self.forget()
+        self._replay = None
         for item in held:
             if not item.rigid:
                 n_rows = 6 if item.hold.fixes_tangent else 3
@@ -179,7 +209,8 @@ class MujocoModel(ABC):
     def step(self, n_steps: int, held: Sequence[Held], loads: Sequence[Load]) -> None:
         """Advances the clock; on a `StepError` the state is the one before."""
         before = self.get_numbers()
-        if any(item.moves for item in held):
+        moving = any(item.moves for item in held)
+        if moving:
             self.write_targets(held, self._lead)
             self._run(1, loads)
             n_steps -= 1
@@ -190,6 +221,7 @@ class MujocoModel(ABC):
                 self.targets_ahead = False
             self._run(n_steps, loads)
         self.forget()
+        self._replay = before if moving and n_steps == 0 else None
         if any(warning.number for warning in self._warnings):
             time = self.data.time
             for warning in self._warnings:

@@ -180,6 +180,22 @@ def test_clamp_attach_move_and_release(hose):
     np.testing.assert_allclose(hose.position(0.0)[0], 0.0, atol=1e-3)
 
 
+def test_a_hold_that_speeds_up_carries_the_mass(model):
+    # Drawn along its own line: F = m a, wherever the hold is by then and however it is made.
+    hose = make(model, gravity=(0.0, 0.0, 0.0))
+    hose.reset([[0, 0, 0], [1, 0, 0]])
+    end = hose.attach(0.0)
+    for k in range(1, 401):
+        hose.move(end, [-1.5 * (5e-4 * k) ** 2, 0.0, 0.0])
+        hose.step()
+    np.testing.assert_allclose(hose.reaction(end).force, [-3.0 * DENSITY, 0, 0], atol=0.015)
+    np.testing.assert_allclose(hose.tension(0.5), 1.5 * DENSITY, atol=0.015)
+    np.testing.assert_allclose(hose.momentum().linear, [-0.6 * DENSITY, 0, 0], atol=1e-3)
+    force = hose.reaction(end).force
+    hose.restore(hose.snapshot())
+    np.testing.assert_allclose(hose.reaction(end).force, force, rtol=1e-6, atol=1e-9)
+
+
 def test_static_reactions_carry_the_weight_and_the_load(hose):
     clamp = hose.clamp(0.0)
     hose.apply_force(0.8, [0.0, 0.0, -0.3])

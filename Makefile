@@ -9,17 +9,21 @@ BIN := $(VENV)/bin
 CORE := $(VENV)/.installed-core
 DEV := $(VENV)/.installed-dev
 PINS := pyproject.toml constraints.txt
+NEXT_VENV := $(VENV)-mujoco4
+NEXT_BIN := $(NEXT_VENV)/bin
+NEXT := $(NEXT_VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow lint clean
+.PHONY: help demo test test-slow test-mujoco4 lint clean
 
 help:
 	@echo 'make demo        install, then compare the hose models in short form (report in out/demo)'
 	@echo 'make test        install with the dev extra, then ruff, mypy and pytest'
 	@echo '                 PYTEST_ARGS="tests/tools -x" goes to pytest'
 	@echo 'make test-slow   only the slow tests, which make test leaves out'
+	@echo 'make test-mujoco4  the flex rod and GEDS under MuJoCo 4, in a virtual environment of its own'
 	@echo 'make lint        only ruff and mypy'
-	@echo 'make clean       remove $(VENV), build products, caches and out/demo (runs are kept)'
+	@echo 'make clean       remove $(VENV), $(NEXT_VENV), build products, caches and out/demo (runs are kept)'
 	@echo ''
 	@echo 'PYTHON=/path/to/python picks the interpreter (3.11 or 3.12) of a new $(VENV);'
 	@echo 'VENV=folder puts it elsewhere. uv installs if it is on the PATH, pip otherwise.'
@@ -34,13 +38,18 @@ test: lint
 test-slow: $(DEV)
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 
+# Under MuJoCo 4 dm-control does not load and the composite cable is gone: only what is left runs.
+test-mujoco4: $(NEXT)
+	$(NEXT_BIN)/python -m pytest -m 'not slow' -k 'mujoco4 or flex or geds' $(PYTEST_ARGS) \
+	  tests/hoses/test_mujoco4.py tests/hoses/test_flex.py tests/contracts
+
 lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) build dist out/demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(NEXT_VENV) build dist out/demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find hose_mj learning tools tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # A candidate counts only if it runs and is of a version we support: a name on the PATH may be a
@@ -69,6 +78,16 @@ $(CORE): $(PINS) | $(BIN)/python
 $(DEV): $(PINS) | $(BIN)/python
 	$(call install,.[dev])
 	@touch $(CORE) $@
+
+# The tested versions of all but MuJoCo; pytest finds the package in this folder.
+$(NEXT): $(PINS) | $(BIN)/python
+	@echo 'Installing MuJoCo 4 and what the hose models need into $(NEXT_VENV)'
+	@$(BIN)/python -m venv $(NEXT_VENV)
+	@grep -v '^mujoco==' constraints.txt > $(NEXT_VENV)/constraints.txt
+	@$(NEXT_BIN)/python -m pip install --quiet --disable-pip-version-check \
+	  --constraint $(NEXT_VENV)/constraints.txt \
+	  'mujoco>=4,<5' numpy scipy numba pytest pytest-timeout hypothesis
+	@touch $@
 
 define install
 @echo 'Installing $(1) into $(VENV) (a minute or two the first time)'

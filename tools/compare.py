@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from hose_mj.validation.case import Case
     from hose_mj.validation.compare import Ratio
 
-MODELS = ("geds", "cable", "hinge-chain")
+MODELS = ("geds", "cable", "flex", "hinge-chain")
 
 
 @dataclass(frozen=True)
 class Args:
-    """Compare the GEDS hose with MuJoCo's composite cable and with closed forms.
+    """Compare the GEDS hose with MuJoCo's cable and flex and with closed forms.
 
     Writes report.html (self-contained), plots as PNG, the numbers as records.parquet and
     records.csv, and models.rrd, a Rerun recording with the models overlaid.
@@ -34,7 +34,9 @@ class Args:
 
     cases: tuple[str, ...] = ()
     """Case ids or families; all of them by default, with the checks of GEDS's own numerics."""
-    models: Annotated[tuple[str, ...], tyro.conf.arg(metavar="{geds,cable,hinge-chain}")] = MODELS
+    models: Annotated[tuple[str, ...], tyro.conf.arg(metavar="{geds,cable,flex,hinge-chain}")] = (
+        MODELS
+    )
     """Models to run."""
     out: Path = Path("out/compare")
     """Folder for the report, the plots, the numbers and the recording."""

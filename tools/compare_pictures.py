@@ -140,9 +140,12 @@ def _list_work(result: CaseResult) -> list[plots.WorkPoint]:
 
 
 def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[plots.Gap]:
+    """The arrows of a picture: above a level the cable's, below it the hinge chain's."""
     costs = {outcome.setting.label: outcome.wall_s_per_sim_s for outcome in result.outcomes}
     gaps = []
     for ratio in choose_ratios(ratios, result.case.id):
+        if ratio.against == "flex":
+            continue
         cost, against = costs.get(ratio.model_setting), costs.get(ratio.against_setting)
         if cost is not None and against is not None:
             gaps.append(plots.Gap(ratio.at_error, ratio.against, cost, against))

@@ -55,7 +55,8 @@ def _write_glance(page: Page, study: Study, pictures: Pictures) -> None:
     section.paragraph(
         f"**{len(study.checks) - len(failed)} of {len(study.checks)} checks hold.** GEDS is a "
         "cubic spline with a banded implicit solve; MuJoCo's composite cable is a chain of rigid "
-        "segments with explicit elastic forces; the hinge chain is its cheapest planar form."
+        "segments with explicit elastic forces; the hinge chain is its cheapest planar form; the "
+        "flex is a row of point masses with implicit bending, and what MuJoCo 4 is left with."
     )
     _write_verdict(section, study.ratios)
     if "overview" in pictures:
@@ -102,7 +103,7 @@ def _write_ratios(section: Section, study: Study) -> None:
     if like:
         caption = (
             "Wall time at equal error, every model at its cheapest setting of the grid; like "
-            "against like: space against the cable, plane against the hinge chain."
+            "against like: space against the cable and the flex, plane against the hinge chain."
         )
         section.table(header, [_ratio_row(ratio) for ratio in like], caption)
     rest = [ratio for ratio in study.ratios if ratio not in like]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.validation import numerics, twist_checks
+from hose_mj.validation import flex_checks, numerics, twist_checks
 from hose_mj.validation.case import Case
 from hose_mj.validation.compare import (
     CaseResult,
@@ -78,6 +78,9 @@ def run_study(
         if result.case.motion is not None:
             study.checks += check_motions(result)
             study.ratios += compute_ratios(result)
+    if "flex" in models and any(case.id == flex_checks.CASE for case in cases):
+        advance("stretch of the flex rod")
+        study.checks += flex_checks.check_flex_stretch()
     if with_numerics:
         _run_numerics(study, np.random.default_rng(seed), advance)
     return study

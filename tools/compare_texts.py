@@ -58,9 +58,12 @@ def write_method(page: Page, quick: bool) -> None:
             "GEDS control points": ", ".join(map(str, grid.dynamic["geds"])),
             "chain segments": ", ".join(map(str, grid.dynamic["hinge-chain"])),
             "GEDS schemes": "; ".join(grid.schemes["geds"]) + "; Newton tolerance 1e-3 L",
+            "flex segments": ", ".join(map(str, grid.dynamic["flex"])),
             "cable integrators": ", ".join(grid.schemes["cable"]),
             "hinge-chain integrators": ", ".join(grid.schemes["hinge-chain"]),
-            "MuJoCo solver": "Newton, 100 iterations, tolerance 1e-8, dense Jacobian (faster here)",
+            "flex integrator": ", ".join(grid.schemes["flex"]),
+            "MuJoCo solver": "Newton, 100 iterations, tolerance 1e-8, the faster Jacobian: "
+            "chains dense, flex sparse",
             "longest run scored": f"{grid.longest_run:g} s",
             "timing": f"least of {grid.rounds} rounds, all models in turn, one thread",
         }
@@ -70,8 +73,8 @@ def write_method(page: Page, quick: bool) -> None:
 _FAIRNESS = {
     "Equal error": "Speeds mean nothing unless errors are equal. Each model runs on a grid of "
     "resolutions, integrators and time steps, and stands at each level with its cheapest setting "
-    "within that error. Space is held against the cable, which moves in space; the plane against "
-    "the hinge chain.",
+    "within that error. Space is held against the cable and the flex, which move in space; the "
+    "plane against the hinge chain.",
     "The clamp": "MuJoCo's documented clamp makes the whole first segment rigid, half a segment "
     "too late, which costs a first-order error. It is run as documented and with the segment "
     "centred on the end; ratios use the corrected clamp only.",
@@ -83,6 +86,8 @@ _FAIRNESS = {
     "hose, GEDS against the limit with its stiffness. Both are converged far beyond the runs "
     "they judge, and MuJoCo's own limit, extrapolated in its segments, has to agree with the "
     "former.",
-    "Statics": "MuJoCo has no static solver; the one used for its chains is ours, so statics are "
+    "Flex": "MuJoCo's 1-D flex takes bending implicitly, so its ladder begins where its error "
+    "does; its edges stretch a little, which a check measures. No twist, and no promise on ratios.",
+    "Statics": "MuJoCo has no static solver; the one used for its hoses is ours, so statics are "
     "held by error only, and against closed forms that know no hose model.",
 }

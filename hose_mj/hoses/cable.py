@@ -45,7 +45,8 @@ class CableHose(MujocoChainHose):
     twist limits it, because a thin hose has little rotational inertia about its own axis.
     Kelvin-Voigt damping is joint damping tau EI / h, which a ball joint also applies to twist. Not
     mapped: stretching (inextensible), drag, rest_strain and rest_curvature (errors unless 0). A
-    clamp also holds the twist.
+    clamp also holds the twist, as the material's angle when it is made; `move` may spin it. Each of
+    the N - 1 joints keeps less than half a turn: MuJoCo knows its rotation only up to full turns.
 
     Args:
         spec: what the hose is made of.
@@ -112,6 +113,7 @@ class BallJoints(ChainKind):
         self.spec = spec
         self.base_frame = np.array([1.0, 0.0, 0.0, 0.0])
         self.stiffness = (torsional_stiffness, spec.bending_stiffness)
+        self.twists = True
 
     def make_chain(
         self, layout: ChainLayout, root: tuple[Array, Array] | None

@@ -31,6 +31,7 @@ class Held:
         last_position: target of the step before.
         last_frame: target of the step before.
         rigid: the first segment is part of the world, else an equality constraint holds it.
+        spun: sum of the spins since the step before (rad).
     """
 
     hold: Hold
@@ -39,12 +40,14 @@ class Held:
     last_position: Array
     last_frame: Array
     rigid: bool = False
+    spun: float = 0.0
 
-    WIDTH: ClassVar[int] = 18
+    WIDTH: ClassVar[int] = 19
 
     def to_numbers(self) -> Array:
-        """All of it as one array (18,)."""
-        flags = [self.hold.number, self.hold.arc_length, self.hold.fixes_tangent, self.rigid]
+        """All of it as one array (19,)."""
+        hold = self.hold
+        flags = [hold.number, hold.arc_length, hold.fixes_tangent, self.rigid, self.spun]
         last = [self.last_position, self.last_frame]
         return np.concatenate([flags, self.position, self.frame, *last])
 
@@ -52,8 +55,9 @@ class Held:
     def from_numbers(cls, row: Array) -> Held:
         """The inverse of `to_numbers`."""
         hold = Hold(int(row[0]), float(row[1]), bool(row[2]))
-        position, frame, last_position, last_frame = np.split(row[4:].copy(), [3, 7, 10])
-        return cls(hold, position, frame, last_position, last_frame, bool(row[3]))
+        position, frame, last_position, last_frame = np.split(row[5:].copy(), [3, 7, 10])
+        rigid, spun = bool(row[3]), float(row[4])
+        return cls(hold, position, frame, last_position, last_frame, rigid, spun)
 
     @property
     def moves(self) -> bool:
@@ -65,7 +69,7 @@ class Held:
 
     def arrived(self) -> Held:
         """The same hold after a step."""
-        return replace(self, last_position=self.position, last_frame=self.frame)
+        return replace(self, last_position=self.position, last_frame=self.frame, spun=0.0)
 
     def ahead(self, steps: float) -> tuple[Array, Array]:
         """Pose that a target moving on as in this step reaches so many steps later."""

@@ -17,10 +17,12 @@ class ChainKind(ABC):
     Attributes:
         base_frame: frame (4,) from which the first segment's is turned.
         stiffness: GJ, EI of the joints (N m^2).
+        twists: a segment can turn about the tangent against its neighbours.
     """
 
     base_frame: Array
     stiffness: tuple[float, float]
+    twists: bool
 
     @abstractmethod
     def make_chain(

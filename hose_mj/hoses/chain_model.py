@@ -1,40 +1,44 @@
-"""One compiled mjModel of a chain: its settings, how it is made, its state and its steps."""
+"""One compiled mjModel of a chain: its settings, how it is made, its state and its forces."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.chain_holds import Held, Load, add_equality, make_layout
+from hose_mj.hoses.chain_holds import (
+    Held,
+    Load,
+    add_equality,
+    check_segments,
+    compute_equality_reaction,
+    compute_root_reaction,
+    make_layout,
+)
 from hose_mj.hoses.chain_kind import ChainKind
-from hose_mj.hoses.chain_layout import rotation_matrix, turn_frame
+from hose_mj.hoses.chain_layout import rotation_matrix, transport_frames, turn_frame
 from hose_mj.hoses.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.chain_settings import ChainSettings
 from hose_mj.hoses.chain_statics import (
     BodyPoint,
+    ChainSystem,
     StaticChain,
     StaticHold,
     StaticLoad,
-    StaticSystem,
-    linearize,
-    solve_equilibrium,
 )
-from hose_mj.hoses.model import Array, Linearization
+from hose_mj.hoses.model import Array, Energies, Linearization, Momentum, Reaction
+from hose_mj.hoses.mujoco_model import Motion, MujocoModel
+from hose_mj.hoses.mujoco_statics import linearize, solve_equilibrium
 from hose_mj.hoses.spec import HoseSpec
 
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_BAD = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
+_ADVICE = (
+    "the elastic forces are explicit and unstable; try a smaller timestep, fewer segments or a "
+    "lower torsional stiffness"
 )
 
 
-class ChainModel:
+class ChainModel(MujocoModel):
     """A compiled chain with its holds.
 
     Args:
@@ -45,12 +49,8 @@ class ChainModel:
 
     Attributes:
         layout: arc lengths of the nodes.
-        model: the mjModel.
-        data: its mjData.
         bodies: body ids of the segments (N,).
         mass: of the segments.
-        targets_ahead: the bodies that hold the hose may be elsewhere than the holds' targets.
-        settled: what each equality constraint does, by hold number, after `settle` only.
     """
 
     def __init__(
@@ -72,15 +72,10 @@ class ChainModel:
             if not item.rigid:
                 (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
                 add_equality(maker, bodies[index], along, item, settings.hold_options())
-        self.model = maker.compile()
-        self.data = mujoco.MjData(self.model)
+        check_segments(self.layout, held)
+        super().__init__(maker.compile(), settings.lead, _ADVICE)
         self.bodies = np.array([self.model.body(body.name).id for body in bodies])
-        self._lead = settings.lead
-        self.targets_ahead = True
-        self._warnings = [self.data.warning[kind] for kind in _BAD]
-        self.settled: dict[int, Load] = {}
         self._motion: ChainMotion | None = None
-        self._forces_known = False
 
     def _root_pose(self, held: Held) -> tuple[Array, Array]:
         """First node and frame of a first segment that a clamp at s = 0 makes part of the world."""
@@ -100,8 +95,22 @@ class ChainModel:
         self.data.qvel[:] = self.kind.to_qvel(velocity, spins, frames, self.rooted)
         self.forget()
 
-    def take_over(self, old: ChainMotion, held: Sequence[Held]) -> None:
+    @property
+    def nodes(self) -> Array:
+        """Rest arc lengths of the nodes (N + 1,), m; the first may be below 0."""
+        return self.layout.nodes
+
+    def lay(self, points: Array, speeds: Array | None) -> None:
+        """The first node is on its point; each segment points along the chord of its nodes."""
+        still = np.zeros((self.layout.segments, 3))
+        frames = transport_frames(points, self.kind.base_frame)
+        self.set_state(points[0], frames, still[0], still)
+        if speeds is not None:
+            self.fit_velocity(speeds)
+
+    def take_over(self, old: Motion, held: Sequence[Held]) -> None:
         """Lays and moves the chain as another one; a rigid clamp's target comes first."""
+        assert isinstance(old, ChainMotion)
         layout = self.layout
         nearest, _ = old.layout.locate((layout.nodes[:-1] + layout.nodes[1:]) / 2)
         points = old.position(layout.nodes)
@@ -128,19 +137,6 @@ class ChainModel:
         self.data.qvel[:] = np.linalg.lstsq(system, speeds.ravel(), rcond=1e-10)[0]
         self.forget()
 
-    def get_numbers(self) -> Array:
-        """All of MuJoCo's state that the next steps depend on."""
-        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
-        mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return state
-
-    def set_numbers(self, state: Array) -> None:
-        """The inverse of `get_numbers`."""
-        if state.shape != (mujoco.mj_stateSize(self.model, _STATE),):
-            raise InputError("size of the state", state.shape, "a snapshot of this very hose")
-        mujoco.mj_setState(self.model, self.data, state, _STATE)
-        self.forget()
-
     def motion(self) -> ChainMotion:
         """How the chain lies and moves now."""
         if self._motion is None:
@@ -155,20 +151,50 @@ class ChainModel:
         """
         if self._forces_known:
             return
-        self.write_loads([*loads, *self.settled.values()])
         flags = self.model.opt.disableflags
         if self.settled:
             self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
-        mujoco.mj_forward(self.model, self.data)
+        self.forward([*loads, *self.settled.values()])
         mujoco.mj_rnePostConstraint(self.model, self.data)
         self.model.opt.disableflags = flags
         self.write_loads(loads)
         self._forces_known = True
 
+    def reaction(self, held: Held) -> Reaction:
+        """What the world or an equality constraint does to the chain."""
+        if held.rigid:
+            return compute_root_reaction(self.data, held, int(self.bodies[0]))
+        body = self.point(held.hold.arc_length).body
+        return compute_equality_reaction(self.model, self.data, held, body)
+
+    def tension(self, arc_lengths: Array) -> Array:
+        """Axial force in the joints, straight lines between and beyond them."""
+        tangents = self.motion().tangent(self.layout.nodes[1:-1])
+        on_rest = self.data.cfrc_int[self.bodies[1:], 3:]
+        return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
+
+    def torque(self, arc_lengths: Array) -> Array:
+        """Moment about the mean of the tangents on both sides of a joint, damping included."""
+        motion = self.motion()
+        wrenches = self.data.cfrc_int[self.bodies[1:]]
+        arms = self.data.subtree_com[self.bodies[0]] - motion.starts[1:]
+        on_rest = wrenches[:, :3] + np.cross(arms, wrenches[:, 3:])
+        tangents = motion.tangent(self.layout.nodes[1:-1])
+        return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
+
+    def energies(self) -> Energies:
+        """Energies at the present state; `stretching` is 0."""
+        gravity = self.model.opt.gravity
+        return self.motion().energies(self.mass, self.kind.stiffness, gravity)
+
+    def momentum(self) -> Momentum:
+        """Linear and angular momentum at the present state."""
+        return self.motion().momentum(self.mass)
+
     def forget(self) -> None:
         """Drops what was computed for an earlier state."""
-        self._motion, self._forces_known = None, False
-        self.settled = {}
+        super().forget()
+        self._motion = None
 
     def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
         """Moves to static equilibrium, velocity zero."""
@@ -177,14 +203,7 @@ class ChainModel:
         self.write_targets(held)
         self.data.qpos[:] = system.data.qpos
         self.data.qvel[:], self.data.qacc_warmstart[:] = 0.0, 0.0
-        self.forget()
-        for item in held:
-            if not item.rigid:
-                n_rows = 6 if item.hold.fixes_tangent else 3
-                wrench = np.zeros(6)
-                wrench[:n_rows], multipliers = multipliers[:n_rows], multipliers[n_rows:]
-                load = Load(item.hold.arc_length, wrench[:3], wrench[3:])
-                self.settled[item.hold.number] = load
+        self.keep_settled(multipliers, held)
 
     def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
         """Small motions about the present pose."""
@@ -216,43 +235,7 @@ class ChainModel:
             self.data.xfrc_applied[point.body, :3] += load.force
             self.data.xfrc_applied[point.body, 3:] += load.moment + np.cross(arm, load.force)
 
-    def step(self, n_steps: int, held: Sequence[Held], loads: Sequence[Load]) -> None:
-        """Advances the clock; on a `StepError` the state is the one before."""
-        before = self.get_numbers()
-        if any(item.moves for item in held):
-            self.write_targets(held, self._lead)
-            self._run(1, loads)
-            n_steps -= 1
-            self.targets_ahead = True
-        if n_steps:
-            if self.targets_ahead:
-                self.write_targets(held)
-                self.targets_ahead = False
-            self._run(n_steps, loads)
-        self.forget()
-        if any(warning.number for warning in self._warnings):
-            time = self.data.time
-            for warning in self._warnings:
-                warning.number = 0
-            self.set_numbers(before)
-            raise StepError(
-                f"MuJoCo met a NaN or a huge number within {n_steps} steps from time "
-                f"{self.data.time:g} s (it reset itself and went on to {time:g} s): the elastic "
-                f"forces are explicit and unstable at timestep {self.model.opt.timestep:g} s; try "
-                "a smaller timestep, fewer segments or a lower torsional stiffness"
-            )
-
-    def _run(self, n_steps: int, loads: Sequence[Load]) -> None:
-        """Steps MuJoCo; loads follow the segments."""
-        with _mute_warnings():
-            if not loads:
-                mujoco.mj_step(self.model, self.data, n_steps)
-                return
-            for _ in range(n_steps):
-                self.write_loads(loads)
-                mujoco.mj_step(self.model, self.data)
-
-    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> StaticSystem:
+    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> ChainSystem:
         """The equations of equilibrium from the present pose on."""
         holds = [
             StaticHold(
@@ -266,15 +249,4 @@ class ChainModel:
         forces = [StaticLoad(self.point(x.arc_length), x.force, x.moment) for x in loads]
         chain = StaticChain(self.kind, self.model, self.bodies, self.rooted, self.layout)
         motion = self.motion()
-        return StaticSystem(chain, motion.starts[0], motion.frames, holds, forces)
-
-
-@contextmanager
-def _mute_warnings() -> Iterator[None]:
-    """Keeps MuJoCo from printing and from leaving a log file: the caller raises one clear error."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
+        return ChainSystem(chain, motion.starts[0], motion.frames, holds, forces)

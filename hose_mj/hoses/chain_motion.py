@@ -104,6 +104,16 @@ class ChainMotion:
         at_joints = angles / self.layout.segment_length
         return np.maximum(self.layout.interpolate(arc_lengths, at_joints), 0.0)
 
+    def twist(self, arc_lengths: Array) -> Array:
+        """Angle about the tangent over segment length (k,), rad/m."""
+        turns = self.joint_rotations()[:, 0]
+        return self.layout.interpolate(arc_lengths, turns / self.layout.segment_length)
+
+    def frame(self, arc_length: float) -> Array:
+        """Frame (4,) of the segment there."""
+        (index,), _ = self.layout.locate(np.array([arc_length]))
+        return np.asarray(self.frames[index])
+
     def energies(self, mass: ChainMass, stiffness: tuple[float, float], gravity: Array) -> Energies:
         """Energies (J); `stiffness` is GJ, EI (N m^2)."""
         centres, velocities, spins = self._centre_motion(mass)

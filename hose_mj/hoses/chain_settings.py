@@ -56,10 +56,7 @@ class ChainSettings:
         check_count("iterations", self.iterations, 1)
         check_choice("integrator", self.integrator, INTEGRATORS)
         check_choice("jacobian", self.jacobian, JACOBIANS)
-        if self.hold_solref is not None:
-            first, second = check_numbers("hold_solref", self.hold_solref, 2)
-            if not (first > 0 and second > 0) and not (first < 0 and second < 0):
-                raise InputError("hold_solref", self.hold_solref, "two positive or two negative")
+        check_solref("hold_solref", self.hold_solref)
         check_numbers("hold_solimp", self.hold_solimp, 5)
 
     def apply(self, option: Any) -> None:
@@ -75,18 +72,30 @@ class ChainSettings:
 
     @property
     def lead(self) -> float:
-        """Steps by which a moving target must run ahead for a hold to be in time."""
+        """Steps by which a moving target must run ahead for a hold to be in time.
+
+        The integrator "discrete" lets a hold see the position that the step ends with, but not
+        where its target will be then: one step more.
+        """
         first, second = self._solref
         damping, stiffness = -second, -first
         if first > 0:
             damping, stiffness = 2 / first, 1 / (first * second) ** 2
-        return damping / (stiffness * self.timestep) - 1.0
+        return damping / (stiffness * self.timestep) - (self.integrator != "discrete")
 
     @property
     def _solref(self) -> tuple[float, float]:
         if self.hold_solref is None:
             return 2 * self.timestep, 1.0
         return float(self.hold_solref[0]), float(self.hold_solref[1])
+
+
+def check_solref(name: str, value: Sequence[float] | None) -> None:
+    """Raises `InputError` unless `value` is None, two positive or two negative numbers."""
+    if value is not None:
+        first, second = check_numbers(name, value, 2)
+        if not (first > 0 and second > 0) and not (first < 0 and second < 0):
+            raise InputError(name, value, "two positive or two negative")
 
 
 def check_numbers(name: str, value: Sequence[float], count: int) -> Array:

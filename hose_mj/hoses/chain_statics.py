@@ -1,10 +1,8 @@
-"""Static equilibrium and small motions of a chain inside an mjModel.
+"""The equations of static equilibrium of a chain inside an mjModel.
 
 Unknowns x are the change of the first node and the rotation vectors of the segments in the world
 frame; relative rotations would do for planar chains, but in space they make a hose with little
-torsional stiffness look unstable wherever it is out of equilibrium. With the force f(x) of springs,
-gravity and loads at zero velocity, the hold errors c(x), their Jacobian J and the forces lambda of
-the holds, equilibrium is f + J^T lambda = 0 and c = 0.
+torsional stiffness look unstable wherever it is out of equilibrium. The constraints are the holds.
 """
 
 from __future__ import annotations
@@ -14,7 +12,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hose_mj.errors import StepError
 from hose_mj.hoses.chain_kind import ChainKind
 from hose_mj.hoses.chain_layout import (
     ChainLayout,
@@ -25,12 +22,8 @@ from hose_mj.hoses.chain_layout import (
     rotation_vector,
     turn_frame,
 )
-from hose_mj.hoses.model import Array, Linearization
-
-_MOST_TURN, _LEAST_TURN = 0.5, 0.02  # rad a segment may turn in one iteration
-_PLAIN, _GUARDED = 60, 300  # most iterations
-_TOLERANCE = 1e-9  # of forces against the largest moments around, of hold errors against L
-_RANK = 1e-6  # holds weaker than this, against the strongest, are redundant
+from hose_mj.hoses.model import Array
+from hose_mj.hoses.mujoco_statics import StaticSystem
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,7 @@ class StaticChain:
     layout: ChainLayout
 
 
-class StaticSystem:
+class ChainSystem(StaticSystem):
     """The functions f, c and J on a scratch mjData of its own.
 
     Args:
@@ -126,7 +119,7 @@ class StaticSystem:
         turns = exponential(full[3:].reshape(-1, 3))
         self.set_pose((self.pose[0] + full[:3], multiply(turns, self.pose[1])))
 
-    def drop_twist(self) -> None:
+    def drop_idle(self) -> None:
         """Undoes the twist of the joints of a hose without GJ, but next to clamps."""
         if self.chain.kind.stiffness[0] != 0.0:
             return
@@ -175,7 +168,7 @@ class StaticSystem:
                 rows.extend(self._spread(row)[None] for row in angular)
         return np.concatenate(rows)
 
-    def idle_spins(self) -> Array:
+    def idle_motions(self) -> Array:
         """Rows (k, n) of the spins about tangents that nothing resists in a hose without GJ."""
         tangents = self.data.xmat[self.chain.bodies].reshape(-1, 3, 3)[:, :, 0]
         held = {hold.point.body for hold in self.holds if hold.frame is not None}
@@ -233,116 +226,3 @@ class StaticSystem:
     def _add_wrench(self, point: BodyPoint, force: Array, moment: Array, total: Array) -> None:
         where = self._world(point)
         mujoco.mj_applyFT(self.model, self.data, force, moment, where, point.body, total)
-
-
-class Metric:
-    """Directions that the holds fix and leave, in coordinates where the mass matrix is 1.
-
-    With M = L L^T, y = L^T dx and J L^-T = U S V^T, the columns of V beyond the rank are free.
-    Redundant holds (a straight hose held at both ends, a planar one out of its plane) lower the
-    rank; spins that nothing resists count as held.
-
-    Attributes:
-        multipliers: the lambda that come closest to equilibrium.
-    """
-
-    def __init__(self, system: StaticSystem) -> None:
-        self._factor = np.linalg.cholesky(system.mass())
-        holds, idle = system.constraints(), system.idle_spins()
-        rows = self._lower(np.concatenate([holds, idle]).T).T
-        left, singular, right = np.linalg.svd(rows)
-        rank = int(np.sum(singular > _RANK * singular.max(initial=0.0)))
-        self._singular, self._left = singular[:rank], left[:, :rank]
-        self._fixed, self._free = right[:rank].T, right[rank:].T
-        bare = self._lower(system.force(np.zeros(len(holds))))
-        forces = -self._left @ (self._fixed.T @ bare / self._singular)
-        self.multipliers: Array = forces[: len(holds)]
-
-    def newton_step(self, system: StaticSystem, guarded: bool) -> Array:
-        """Returns the dx that closes the holds and brings the rest to equilibrium.
-
-        Guarded, negative eigenvalues of the reduced stiffness change their sign, so that an
-        unstable equilibrium repels. That takes forces that have an energy.
-        """
-        stiffness = system.stiffness(self.multipliers)
-        if guarded:
-            stiffness = (stiffness + stiffness.T) / 2
-        stiffness = self._lower(self._lower(stiffness).T).T
-        errors = self._left[: len(self.multipliers)].T @ system.errors()
-        closing = -self._fixed @ (errors / self._singular)
-        force = self._lower(system.force(self.multipliers)) - stiffness @ closing
-        force, stiffness = self._free.T @ force, self._free.T @ stiffness @ self._free
-        if guarded:
-            values, vectors = np.linalg.eigh(stiffness)
-            values = np.maximum(np.abs(values), system.softest)
-            change = vectors @ (vectors.T @ force / values)
-        else:
-            change = np.linalg.solve(stiffness + system.softest * np.eye(len(force)), force)
-        return np.asarray(np.linalg.solve(self._factor.T, closing + self._free @ change))
-
-    def is_stable(self, system: StaticSystem) -> bool:
-        """No direction that the holds leave has a clearly negative stiffness."""
-        stiffness = self._lower(self._lower(system.stiffness(self.multipliers)).T)
-        reduced = self._free.T @ stiffness @ self._free
-        values = np.linalg.eigvalsh((reduced + reduced.T) / 2)
-        return bool(values.min(initial=0.0) > -1e3 * system.softest)
-
-    def _lower(self, right: Array) -> Array:
-        """L^-1 times a vector or matrix."""
-        return np.asarray(np.linalg.solve(self._factor, right))
-
-
-def solve_equilibrium(system: StaticSystem) -> Array:
-    """Brings the system to a static equilibrium near its state; returns lambda.
-
-    Plain Newton steps first. Where they fail or end in an unstable equilibrium, guarded ones follow
-    from the start; not with moments, which have no energy when they keep their direction in space.
-    The cable's own forces have none either where GJ differs from EI: last come more plain steps.
-
-    Raises:
-        StepError: it did not come to rest.
-    """
-    start = system.pose
-    attempts = [(False, _PLAIN), (True, _GUARDED), (False, _GUARDED)]
-    for guarded, iterations in attempts if system.conservative else attempts[2:]:
-        system.set_pose(start)
-        multipliers = _iterate(system, guarded, iterations)
-        if multipliers is None:
-            continue
-        if iterations == _GUARDED or Metric(system).is_stable(system):
-            return multipliers
-    raise StepError(
-        "no static equilibrium was found: a residual of "
-        f"{system.residual(Metric(system).multipliers):.1e} of the largest moments is left "
-        f"(wanted {_TOLERANCE:.0e}) after {_GUARDED} Newton steps; start from a shape closer to "
-        "it, or apply the loads in steps"
-    )
-
-
-def _iterate(system: StaticSystem, guarded: bool, iterations: int) -> Array | None:
-    """Newton's method, capped by the rotation of the segments; None where it does not converge.
-
-    The cap shrinks while the residual grows.
-    """
-    cap, last = _MOST_TURN, np.inf
-    for _ in range(iterations):
-        system.drop_twist()
-        metric = Metric(system)
-        residual = system.residual(metric.multipliers)
-        if residual < _TOLERANCE:
-            return metric.multipliers
-        cap = min(2 * cap, _MOST_TURN) if residual < last else max(cap / 2, _LEAST_TURN)
-        last = residual
-        change = metric.newton_step(system, guarded)
-        system.advance(min(1.0, cap / max(system.largest_turn(change), 1e-300)) * change)
-    return None
-
-
-def linearize(system: StaticSystem) -> Linearization:
-    """Mass, tangent stiffness and constraints at the system's state.
-
-    The stiffness includes the change of the hold forces' directions, at the forces that come
-    closest to equilibrium, and is symmetrised (exact at an equilibrium).
-    """
-    stiffness = system.stiffness(Metric(system).multipliers, central=True)
-    return Linearization(system.mass(), (stiffness + stiffness.T) / 2, system.constraints())

@@ -106,6 +106,7 @@ class HingeJoints(ChainKind):
         self.spec, self.plane = spec, plane
         self.base_frame = PLANE_FRAMES[plane]
         self.stiffness = (0.0, spec.bending_stiffness)
+        self.twists = False
         self._axes = rotation_matrix(self.base_frame)
 
     def make_chain(

@@ -112,7 +112,11 @@ class HoseModel(Protocol):
         position: ArrayLike | None = None,
         tangent: ArrayLike | None = None,
     ) -> Hold:
-        """Holds a point and the direction of the tangent there; by default where they are now."""
+        """Holds a point, the tangent and the twist there; by default as they are now.
+
+        The material keeps the angle about the tangent that it has, but for what the least rotation
+        to another tangent carries along. Models without twist hold the tangent alone.
+        """
         ...
 
     def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
@@ -120,9 +124,21 @@ class HoseModel(Protocol):
         ...
 
     def move(
-        self, hold: Hold, position: ArrayLike | None = None, tangent: ArrayLike | None = None
+        self,
+        hold: Hold,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+        spin: float = 0.0,
     ) -> None:
-        """Sets where a hold is to be at the end of the next step."""
+        """Sets where a hold is to be at the end of the next step.
+
+        A clamp's frame goes to a new tangent by the least rotation, and then turns about it by
+        `spin` (rad, right-handed), which each call adds.
+
+        Raises:
+            InputError: a tangent or a spin for an attachment; a spin for a model without twist, or
+                more of it in one step than the model can tell from a smaller one (a chain: pi).
+        """
         ...
 
     def release(self, hold: Hold) -> None:
@@ -183,6 +199,18 @@ class HoseModel(Protocol):
 
     def curvature(self, arc_length: ArrayLike) -> Array:
         """Material curvature (rotation of the tangent per rest length), shape (k,), 1/m."""
+        ...
+
+    def twist(self, arc_length: ArrayLike) -> Array:
+        """Turn of the material about the tangent per rest length (k,), rad/m.
+
+        What bending carries along, the least rotation from tangent to tangent, does not count. Zero
+        in a model without twist.
+        """
+        ...
+
+    def torque(self, arc_length: ArrayLike) -> Array:
+        """Moment of the part beyond s on the part before it, about the tangent (k,), N m."""
         ...
 
     def energies(self) -> Energies:

@@ -39,6 +39,10 @@ MODELS: dict[str, ModelEntry] = {
         "hose_mj.hoses.cable:CableHose",
         "MuJoCo's composite cable: rigid segments, ball joints, explicit elastic forces",
     ),
+    "flex": ModelEntry(
+        "hose_mj.hoses.flex:FlexHose",
+        "MuJoCo's 1-D flex: point masses, rigid edges, implicit bending, no twist",
+    ),
     "hinge-chain": ModelEntry(
         "hose_mj.hoses.hinge_chain:HingeChainHose",
         "planar chain of hinges and joint springs in MuJoCo, for validation only",

@@ -88,7 +88,7 @@ class Case:
     scale: float | None = None
     motion: Motion | None = None
     clamped: bool = False
-    models: tuple[str, ...] = ("geds", "cable", "hinge-chain")
+    models: tuple[str, ...] = ("geds", "cable", "flex", "hinge-chain")
     steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
     resolutions: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     promised: Mapping[int, float] = field(default_factory=dict)

@@ -22,7 +22,7 @@ from hose_mj.validation.run import (
 )
 from hose_mj.validation.settings import Grid, list_ladders
 
-INEXTENSIBLE = ("cable", "hinge-chain")
+INEXTENSIBLE = ("cable", "flex", "hinge-chain")
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def run_case(
     models = tuple(model for model in models if model in case.models)
     if case.motion is None:
         advance("statics")
-        return CaseResult(case, run_static(case, models, grid))
+        return CaseResult(case, *run_static(case, models, grid))
     advance("reference")
     result = CaseResult(case)
     if "geds" in models:
@@ -210,7 +210,7 @@ _PROMISED = {
     ("hinge-chain", 0.01): 4.0,
     ("hinge-chain", 0.001): 15.0,
 }
-"""How many times cheaper GEDS is to be at equal error on the released rod."""
+"""How many times cheaper GEDS is to be at equal error on the released rod; of flex, no promise."""
 
 
 def _check_released_rod(result: CaseResult) -> list[Check]:
@@ -226,9 +226,9 @@ def _check_released_rod(result: CaseResult) -> list[Check]:
                 checks.append(Check(text, outcome.error, limit))
     for ratio in compute_ratios(result):
         # Like against like: the cable moves in space, the hinge chain in a plane.
-        if ratio.planar == (ratio.against == "hinge-chain"):
+        promised = _PROMISED.get((ratio.against, ratio.at_error))
+        if promised is not None and ratio.planar == (ratio.against == "hinge-chain"):
             level = f"{100 * ratio.at_error:g} % error"
             text = f"released-rod: {ratio.against} over GEDS, wall time at {level}"
-            limit = _PROMISED[ratio.against, ratio.at_error]
-            checks.append(Check(text, ratio.wall_ratio, limit, ">="))
+            checks.append(Check(text, ratio.wall_ratio, promised, ">="))
     return checks

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
@@ -58,9 +60,9 @@ def compute_critical_twist(
 ) -> float:
     """Returns the twist at which a state that twist does not move loses its stability.
 
-    The stiffness of a straight rod or a flat ring is linear in its twist, K0 + M K1: two
-    linearizations tell K1. Sought is the M at which the lowest eigenvalue, neutral modes left out,
-    vanishes.
+    The stiffness of a straight rod or a flat ring is linear in its twist, K0 + M K1, so two
+    linearizations, without twist and with some, tell K1. Sought is the M at which the lowest
+    eigenvalue, neutral modes left out, vanishes.
 
     Args:
         untwisted: the state without twist.
@@ -72,19 +74,26 @@ def compute_critical_twist(
     start = basis.T @ untwisted.stiffness @ basis
     change = (basis.T @ twisted.stiffness @ basis - start) / twist
 
-    def lowest(moment: float) -> float:
+    def find_lowest(moment: float) -> float:
         stiffness = start + moment * change
-        values = eigh(
-            0.5 * (stiffness + stiffness.T),
-            eigvals_only=True,
-            subset_by_index=(n_neutral, n_neutral),
-        )
-        return float(values[0])
+        return float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[n_neutral])
 
     high = twist
-    while lowest(high) > 0.0:
+    while find_lowest(high) > 0.0:
         high *= 1.3
-    return float(brentq(lowest, 0.0, high, xtol=1e-9 * twist))
+    return float(brentq(find_lowest, 0.0, high, xtol=1e-9 * twist))
+
+
+def turn_about_x(small: Linearization, angle: float) -> Linearization:
+    """Returns a linearization whose coordinates are vectors of the world, all turned about x."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+    whole = np.kron(np.eye(len(small.mass) // 3), turn)
+    return Linearization(
+        whole @ small.mass @ whole.T,
+        whole @ small.stiffness @ whole.T,
+        small.constraints @ whole.T,
+    )
 
 
 def _free_basis(small: Linearization) -> Array:

@@ -101,17 +101,24 @@ class Reference:
     uncertainty: float
 
 
-def run_static(case: Case, models: tuple[str, ...], grid: Grid) -> list[Outcome]:
-    """Runs a static case with every setting of the grid."""
+def run_static(
+    case: Case, models: tuple[str, ...], grid: Grid
+) -> tuple[list[Outcome], list[Skipped]]:
+    """Runs a static case with every setting of the grid; skips where no equilibrium was found."""
     assert case.truth is not None
     truth = case.truth()
     outcomes = []
+    skipped = []
     for setting in list_static(case, models, grid):
         hose = setting.make(case)
-        case.lay(hose)
-        start = time.perf_counter()
-        values = case.probe(hose)
-        wall = time.perf_counter() - start
+        try:
+            case.lay(hose)
+            start = time.perf_counter()
+            values = case.probe(hose)
+            wall = time.perf_counter() - start
+        except StepError as failure:
+            skipped.append(Skipped(case.id, setting, str(failure)))
+            continue
         points = hose.position(_drawn(case))[None]
         error = float(np.max(np.abs(values - truth) / (case.scale or np.abs(truth))))
         outcomes.append(
@@ -128,7 +135,7 @@ def run_static(case: Case, models: tuple[str, ...], grid: Grid) -> list[Outcome]
                 values[None],
             )
         )
-    return outcomes
+    return outcomes, skipped
 
 
 def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
@@ -192,7 +199,9 @@ def run_ladder(
     skipped: list[Skipped] = []
     for setting in ladder:
         if setting.model != "geds" and outcomes:
-            if _is_exhausted(outcomes) or len(outcomes) == grid.longest_ladder:
+            flex = setting.model == "flex"
+            most = grid.longest_flex_ladder if flex else grid.longest_ladder
+            if _is_exhausted(outcomes) or len(outcomes) == most:
                 break
             last = outcomes[-1].setting.timestep
             assert setting.timestep is not None

@@ -44,7 +44,7 @@ class Setting:
 
     @property
     def planar(self) -> bool:
-        """Whether a GEDS hose moves in a plane; the hinge chain always does, the cable never."""
+        """Whether a GEDS hose moves in a plane; the hinge chain always does, other peers never."""
         return self.scheme.endswith(", planar")
 
     @property
@@ -64,7 +64,7 @@ class Setting:
             options.setdefault("scheme", "bdf2" if self.timestep is None else scheme)
         else:
             options.update(segments=self.resolution, clamp_correction=bool(self.clamp_corrected))
-            if self.timestep is not None:
+            if self.timestep is not None and self.model != "flex":
                 options.update(integrator=scheme)
         if self.model == "cable" and self.timestep is not None:
             # In a plane nothing twists: less torsional stiffness allows the cable larger steps.
@@ -89,6 +89,7 @@ class Grid:
         schemes: integrators of motions, by model.
         smallest_geds_step: GEDS's time steps end here (s).
         longest_ladder: at most so many time steps of a chain's resolution are scored.
+        longest_flex_ladder: the same for the flex, which is stable from the largest step on.
         longest_run: a run that would take longer is left out (s).
         longest_timed_run: a run that took longer is not timed again (s).
         rounds: how often a short run is timed, all models in turn; the least counts.
@@ -100,6 +101,7 @@ class Grid:
     schemes: dict[str, tuple[str, ...]]
     smallest_geds_step: float
     longest_ladder: int
+    longest_flex_ladder: int
     longest_run: float
     longest_timed_run: float
     rounds: int
@@ -109,33 +111,43 @@ class Grid:
 _SCHEMES = {
     "geds": ("bdf2", "bdf2, planar"),
     "cable": ("euler", "rk4"),
+    "flex": ("discrete",),
     "hinge-chain": ("euler", "rk4", "discrete"),
 }
 FULL = Grid(
     static={
         "geds": (8, 12, 16, 20),
         "cable": (10, 20, 40),
+        "flex": (10, 20, 40),
         "hinge-chain": (10, 20, 40),
     },
     dynamic={
         "geds": (8, 9, 10, 11, 12, 13, 14, 16, 20, 24, 32),
         "cable": (10, 15, 20, 30, 40, 60, 80, 120, 160),
+        "flex": (10, 15, 20, 30, 40, 60, 80, 120, 160),
         "hinge-chain": (10, 15, 20, 30, 40, 60, 80, 120, 160),
     },
     schemes=_SCHEMES,
     smallest_geds_step=0.0,
     longest_ladder=20,
+    longest_flex_ladder=20,
     longest_run=15.0,
     longest_timed_run=2.0,
     rounds=5,
     reference_steps=(512, 128),
 )
 QUICK = Grid(
-    static={"geds": (8, 12, 20), "cable": (20, 40), "hinge-chain": (20,)},
-    dynamic={"geds": (8, 12, 13, 16), "cable": (20, 40), "hinge-chain": (20, 40)},
+    static={"geds": (8, 12, 20), "cable": (20, 40), "flex": (20, 40), "hinge-chain": (20,)},
+    dynamic={
+        "geds": (8, 12, 13, 16),
+        "cable": (20, 40),
+        "flex": (20, 60),
+        "hinge-chain": (20, 40),
+    },
     schemes=_SCHEMES | {"hinge-chain": ("euler", "rk4")},
     smallest_geds_step=0.9e-3,
     longest_ladder=3,
+    longest_flex_ladder=5,
     longest_run=1.3,
     longest_timed_run=0.6,
     rounds=2,
@@ -143,10 +155,13 @@ QUICK = Grid(
 )
 
 
+_STATICS = {"geds": "statics", "flex": "newton on vertices"}
+
+
 def list_static(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[Setting]:
     """Yields the settings of a static case."""
     for model in models:
-        scheme = "statics" if model == "geds" else "newton on joint angles"
+        scheme = _STATICS.get(model, "newton on joint angles")
         for resolution in case.resolutions.get(model, grid.static[model]):
             for corrected in _clamps(model, case):
                 yield Setting(model, scheme, resolution, corrected)

@@ -12,8 +12,14 @@ from hose_mj.hoses.registry import MODELS, make_hose
 from hose_mj.hoses.spec import HoseSpec
 
 LENGTH, DENSITY, WEIGHT = 1.0, 0.1, 0.1 * 9.81
-SMALL = {"geds": {"control_points": 10}, "cable": {"segments": 10}, "hinge-chain": {"segments": 10}}
+SMALL = {
+    "geds": {"control_points": 10},
+    "cable": {"segments": 10},
+    "hinge-chain": {"segments": 10},
+    "flex": {"segments": 20},
+}
 """Options that make a model small; a model without an entry runs as it is by default."""
+WITHOUT_TWIST = {"flex", "hinge-chain"}
 ARC_LENGTHS = np.array([0.0, 0.31, 0.5, 1.0])
 
 
@@ -72,6 +78,16 @@ def test_it_follows_the_protocol(hose):
     assert hose.spec == make_spec()
     assert hose.timestep == 5e-4
     assert hose.time == 0.0
+
+
+def test_queries_of_twist_have_a_leading_axis_of_places(hose):
+    hose.reset(arch)
+    for query in (hose.twist, hose.torque):
+        assert query(0.5).shape == (1,)
+        assert query(ARC_LENGTHS).shape == (4,)
+        np.testing.assert_allclose(query(ARC_LENGTHS), 0.0, atol=1e-9)
+        with pytest.raises(InputError, match=r"arc_length.*1.5.*0 to 1"):
+            query(1.5)
 
 
 def test_queries_have_a_leading_axis_of_places(hose):
@@ -157,6 +173,22 @@ def test_clamp_attach_move_and_release(hose):
     np.testing.assert_allclose(hose.position(0.0)[0], 0.0, atol=1e-3)
 
 
+def test_a_hold_that_speeds_up_carries_the_mass(model):
+    # Drawn along its own line: F = m a, wherever the hold is by then and however it is made.
+    hose = make(model, gravity=(0.0, 0.0, 0.0))
+    hose.reset([[0, 0, 0], [1, 0, 0]])
+    end = hose.attach(0.0)
+    for k in range(1, 401):
+        hose.move(end, [-1.5 * (5e-4 * k) ** 2, 0.0, 0.0])
+        hose.step()
+    np.testing.assert_allclose(hose.reaction(end).force, [-3.0 * DENSITY, 0, 0], atol=0.015)
+    np.testing.assert_allclose(hose.tension(0.5), 1.5 * DENSITY, atol=0.015)
+    np.testing.assert_allclose(hose.momentum().linear, [-0.6 * DENSITY, 0, 0], atol=1e-3)
+    force = hose.reaction(end).force
+    hose.restore(hose.snapshot())
+    np.testing.assert_allclose(hose.reaction(end).force, force, rtol=1e-6, atol=1e-9)
+
+
 def test_static_reactions_carry_the_weight_and_the_load(hose):
     clamp = hose.clamp(0.0)
     hose.apply_force(0.8, [0.0, 0.0, -0.3])
@@ -189,6 +221,46 @@ def test_moment_bends_the_hose(model):
     # One radian over the hose, from x towards z.
     wanted = [math.sin(1.0), 0.0, 1.0 - math.cos(1.0)]
     np.testing.assert_allclose(hose.position(1.0)[0], wanted, atol=0.06)
+
+
+def make_twisted(model, turns, pieces):
+    """A straight hose without gravity whose clamped end was spun, and its two clamps."""
+    spec = make_spec(bending_stiffness=0.5, torsional_stiffness=0.004)
+    many = {"cable": {"segments": 40, "clamp_correction": True}}
+    options = many.get(model, SMALL.get(model, {}))
+    hose = make_hose(model, spec, timestep=5e-4, gravity=(0.0, 0.0, 0.0), **options)
+    hose.reset([[0, 0, 0], [1, 0, 0]])
+    first, last = hose.clamp(0.0), hose.clamp(1.0)
+    for _ in range(pieces):
+        hose.move(last, spin=2 * np.pi * turns / pieces)
+        hose.solve_static()
+    return hose, first, last
+
+
+@pytest.mark.parametrize("turns", [0.1, -10.0])
+def test_spinning_a_clamp_twists_the_hose(model, turns):
+    # GJ phi / L everywhere: far below the torque at which it would buckle, 8.99 EI / L.
+    if model in WITHOUT_TWIST:
+        pytest.skip("has no twist")
+    hose, first, last = make_twisted(model, turns, pieces=max(1, round(4 * abs(turns))))
+    angle = 2 * np.pi * turns
+    torque = 0.004 * angle
+    np.testing.assert_allclose(hose.twist(ARC_LENGTHS), angle, rtol=1e-6)
+    np.testing.assert_allclose(hose.torque(ARC_LENGTHS), torque, rtol=1e-6)
+    np.testing.assert_allclose(hose.reaction(last).moment, [torque, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(hose.reaction(first).moment, [-torque, 0, 0], atol=1e-6)
+    assert hose.energies().twisting == pytest.approx(torque * angle / 2, rel=1e-6)
+    assert hose.energies().bending == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(hose.position(ARC_LENGTHS)[:, 0], ARC_LENGTHS, atol=1e-7)
+
+
+def test_bad_spin(model):
+    hose = make(model)
+    clamp, end = hose.clamp(0.0), hose.attach(1.0)
+    assert re.search("spin.*attachment", catch(lambda: hose.move(end, spin=0.1)))
+    assert re.search("spin.*nan", catch(lambda: hose.move(clamp, spin=math.nan)))
+    if model in WITHOUT_TWIST:
+        assert re.search("spin.*0 for a", catch(lambda: hose.move(clamp, spin=0.1)))
 
 
 def test_energies_add_up(hose):

@@ -354,3 +354,59 @@ def test_registry_names_what_is_wrong():
         make_hose("cable", make_spec(), timestep=1e-3, control_points=8)
     with pytest.raises(InputError, match="timestep"):
         make_hose("cable", make_spec())
+
+
+def test_discrete_holds_follow_a_steady_motion_in_time():
+    # Without the step that the integrator needs more, the end would be .4 mm late.
+    spec = make_spec(damping_time=0.02)
+    hose = make("hinge-chain", timestep=1e-3, integrator="discrete", spec=spec)
+    hose.attach(0.0)
+    end = hose.attach(1.0)
+    for k in range(1, 201):
+        hose.move(end, [1 - 4e-4 * k, 0, 0])
+        hose.step()
+    np.testing.assert_allclose(hose.position(1.0)[0], [0.92, 0, 0], atol=2e-5)
+
+
+# -- twist --------------------------------------------------------------------------------------
+
+
+def test_twist_is_over_the_length_that_is_free():
+    # Two clamped segments leave (N - 1) h to the joints, h = L / N: the documented clamp.
+    hose = make("cable", clamp_correction=False, gravity=(0, 0, 0))
+    hose.clamp(0.0)
+    last = hose.clamp(1.0)
+    hose.move(last, spin=0.9)
+    hose.solve_static()
+    np.testing.assert_allclose(hose.torque([0.0, 0.4, 1.0]), GJ * 0.9 / 0.9, rtol=1e-6)
+    np.testing.assert_allclose(hose.twist(0.5), 1.0, rtol=1e-6)
+
+
+def test_spin_while_running():
+    # Slow against the damped twisting waves: the end follows, the torque is the static one.
+    hose = make("cable", spec=make_spec(damping_time=0.005), gravity=(0, 0, 0))
+    hose.clamp(0.0)
+    last = hose.clamp(1.0)
+    for _ in range(4000):
+        hose.move(last, spin=2 * np.pi / 4000)
+        hose.step()
+    hose.step(2000)
+    np.testing.assert_allclose(hose.twist([0.1, 0.5, 0.9]), 2 * np.pi, rtol=1e-3)
+    torque = GJ * 2 * np.pi
+    np.testing.assert_allclose(hose.torque([0.1, 0.5, 0.9]), torque, rtol=1e-3)
+    np.testing.assert_allclose(hose.reaction(last).moment, [torque, 0, 0], rtol=2e-3, atol=1e-3)
+
+
+def test_spins_of_half_a_turn_in_one_step_are_refused():
+    # A weld sees its target up to full turns: beyond half a turn it would go the shorter way.
+    hose = make("cable")
+    clamp = hose.clamp(1.0)
+    hose.move(clamp, spin=2.0)
+    saved = hose.snapshot()
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"spin is 1.2.*less than pi in one step"):
+            hose.move(clamp, spin=1.2)
+        hose.restore(saved)
+    hose.move(clamp, spin=-1.2)
+    hose.solve_static()
+    hose.move(clamp, spin=2.5)

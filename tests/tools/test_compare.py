@@ -147,7 +147,7 @@ def test_a_failed_check_is_exit_status_1(capsys, tmp_path, monkeypatch):
     ("words", "what"),
     [
         (["--cases", "tip-load-1", "nonsense"], "case is 'nonsense'; valid: heavy-cantilever, "),
-        (["--models", "geds", "flux"], "model is 'flux'; valid: geds, cable, hinge-chain"),
+        (["--models", "geds", "flux"], "model is 'flux'; valid: geds, cable, flex, hinge-chain"),
         (["--models"], "models is (); valid: "),
         (["--cases", "taut-pull-suture", "--models", "cable"], "models is ('cable',); valid: "),
         (["--seed", "-1"], "seed is -1; valid: "),
@@ -200,6 +200,7 @@ def make_motion(models):
             ("geds", "bdf2", None),
             ("geds", "bdf2, planar", None),
             ("cable", "euler", True),
+            ("flex", "discrete", True),
             ("hinge-chain", "rk4", True),
             ("hinge-chain", "rk4", False),
         )

@@ -14,7 +14,7 @@ from hose_mj.validation.settings import FULL, QUICK, Setting, list_ladders, list
 STATIC = [case for case in CASES if case.motion is None]
 DYNAMIC = [case for case in CASES if case.motion is not None]
 PAIRS = [(case, model) for case in CASES for model in case.models]
-COARSE = {"geds": 12, "cable": 10, "hinge-chain": 10}
+COARSE = {"geds": 12, "cable": 10, "flex": 10, "hinge-chain": 10}
 
 
 def name(value):
@@ -139,7 +139,7 @@ def test_geds_with_20_control_points_is_within_a_thousandth(case):
 
 
 @pytest.mark.parametrize("gamma", [1, 10])
-@pytest.mark.parametrize("model", INEXTENSIBLE)
+@pytest.mark.parametrize("model", ["cable", "hinge-chain"])
 def test_mujocos_documented_clamp_has_the_published_errors(model, gamma):
     """A whole rigid first segment: -19 / -9.7 / -5 % with 10 / 20 / 40 segments."""
     (case,) = find_cases((f"heavy-cantilever-gamma-{gamma}",))

@@ -188,14 +188,14 @@ def test_a_static_case_is_scored_by_its_worst_number(case, fake):
         truth=lambda: np.array([1.0, 2.0, -4.0]),
         scale=None,
     )
-    outcomes = run_static(static, ("geds", "cable"), GRID)
+    outcomes, _ = run_static(static, ("geds", "cable"), GRID)
     assert [outcome.error for outcome in outcomes] == pytest.approx([0.1] * len(outcomes))
     assert {outcome.reference for outcome in outcomes} == {"closed form"}
     assert {outcome.wall_s_per_sim_s for outcome in outcomes} == {None}
     clamps = {(outcome.setting.model, outcome.setting.clamp_corrected) for outcome in outcomes}
     assert clamps == {("geds", None), ("cable", True), ("cable", False)}
     by_length = replace(static, scale=0.5)
-    assert run_static(by_length, ("geds",), GRID)[0].error == pytest.approx(0.2)
+    assert run_static(by_length, ("geds",), GRID)[0][0].error == pytest.approx(0.2)
 
 
 def test_a_static_check_fails_by_the_best_error(case, make_outcome, make_result):

@@ -214,7 +214,7 @@ def run_ladder(
             assert last is not None
             if setting.timestep > 0.51 * last:
                 continue
-        why = _foresee(case, setting, grid) if setting.model != "geds" else None
+        why = _foresee(case, setting, grid)
         outcome = None
         if why is None:
             outcome = _score(case, setting, reference)

@@ -1,4 +1,4 @@
-"""The tables [[holds]] of a user's file: where the hose is held, and how the holds move and turn."""
+"""The tables [[holds]] of a user's file: where the hose is held, how holds move and turn."""
 
 from __future__ import annotations
 
@@ -238,5 +238,3 @@ def turn_towards(one: Vector, other: Vector, share: float) -> Vector:
 def _subtract(vector: Vector, along: Vector, amount: float) -> Vector:
     x, y, z = (a - amount * b for a, b in zip(vector, along, strict=True))
     return x, y, z
-
-

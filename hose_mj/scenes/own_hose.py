@@ -18,7 +18,7 @@ from hose_mj.scenes.tables import Table, read_toml
 STARTS = ("equilibrium", "as-laid")
 GRAVITY: Vector = (0.0, 0.0, -9.81)
 ERRORS = (0.01, 0.001)
-BUDGET = 45.0
+BUDGET = 30.0
 _SHAPE_SLACK = 0.01
 
 

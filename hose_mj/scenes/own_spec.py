@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import Fitting, HoseSpec
@@ -15,9 +15,7 @@ LENGTHS = (1e-3, 1e4)
 _MAY_BE_NEGATIVE = ("rest_strain", "rest_curvature", "rest_torsion")
 _MAY_BE_ZERO = ("poisson_ratio", "inner_diameter", "contents_density", "damping_time", "drag")
 _SPEC_KEYS = tuple(field.name for field in fields(HoseSpec) if field.name not in ("radius",))
-_FITTING_KEYS = (
-    *("axial_stiffness", "bending_stiffness", "torsional_stiffness", "linear_density"),
-)
+_FITTING_KEYS = ("axial_stiffness", "bending_stiffness", "torsional_stiffness", "linear_density")
 _ROUND = 1.3
 """EI / GJ of a round section where nothing else is known: 1 + nu for nu = 0.3."""
 _SLENDER = 0.25
@@ -116,4 +114,11 @@ def _read_fitting(table: Table, length: float) -> Fitting:
     end = table.number("end", above=start, most=length)
     values = {key: table.find_number(key, above=0.0) for key in _FITTING_KEYS}
     table.finish()
-    return replace(Fitting(start=start, end=end), **values)
+    return Fitting(
+        start=start,
+        end=end,
+        axial_stiffness=values["axial_stiffness"],
+        bending_stiffness=values["bending_stiffness"],
+        torsional_stiffness=values["torsional_stiffness"],
+        linear_density=values["linear_density"],
+    )

@@ -89,7 +89,7 @@ class Table:
         most: float = LARGEST_NUMBER,
         above: float | None = None,
     ) -> float:
-        """A number from `least` (or above `above`) to `most`; without a default it must be there."""
+        """A number from `least` (or above `above`) to `most`; required without a default."""
         value = self.value(key)
         if value is None and default is not None:
             return default
@@ -100,7 +100,9 @@ class Table:
     ) -> float | None:
         """A number in a range like that of `number`; None where there is none."""
         value = self.value(key)
-        return None if value is None else self._check_number(key, value, least, LARGEST_NUMBER, above)
+        return (
+            None if value is None else self._check_number(key, value, least, LARGEST_NUMBER, above)
+        )
 
     def vector(self, key: str, default: Sequence[float] | None = None) -> Any:
         """Three numbers as a tuple; the default where there are none."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -21,7 +21,12 @@ N_PROBES = 17
 """Places along the hose at which models are compared."""
 REST_POINTS = 48
 """Control points of the rest shape from which all models start."""
-MOST_POINTS_OF_REST = 192
+_FIRST_MODE = 3.5
+"""omega L^2 sqrt(rho A / EI) of a clamped-free beam."""
+_PUSH = 1e-3
+"""By this fraction of the length the hose is bent aside before it comes to rest."""
+_STEPS_TO_REST = 400
+_FLAT = 1e-6
 _PAUSE = 0.04
 _FEWEST, _MOST = 25, 500
 """Samples of a motion: about one per `_PAUSE` seconds, but not fewer or more than these."""
@@ -31,15 +36,17 @@ def make_case(own: OwnHose) -> Case:
     """Returns the case of a user's hose: static where no duration is given, else a motion.
 
     Models start from one line, the rest shape where the hose begins in equilibrium.
+
+    Raises:
+        StepError: GEDS found no rest shape.
     """
     at_rest = own.duration is None or own.start == "equilibrium"
-
-    @cache
-    def line() -> Line:
-        return find_rest(own) if at_rest else make_line(own)
+    line = find_rest(own) if at_rest else make_line(own)
+    places = line(np.linspace(0.0, own.spec.length, N_PROBES))
+    planar = is_planar(own) and bool(np.ptp(places[:, 1]) < _FLAT * own.spec.length)
 
     def lay(hose: HoseModel) -> list[Hold]:
-        holds = put(own, hose, line())
+        holds = put(own, hose, line)
         if at_rest and own.duration is not None:
             hose.solve_static()
         return holds
@@ -64,7 +71,7 @@ def make_case(own: OwnHose) -> Case:
             hold.tangent is not None and hold.arc_length in (0.0, own.spec.length)
             for hold in own.holds
         ),
-        planar=is_planar(own),
+        planar=planar,
     )
 
 
@@ -88,23 +95,36 @@ def put(own: OwnHose, hose: HoseModel, line: Line) -> list[Hold]:
 
 
 def find_rest(own: OwnHose) -> Line:
-    """Returns the equilibrium of GEDS under holds and loads.
+    """Returns an equilibrium of GEDS under holds and loads that small pushes do not upset.
+
+    Newton's method alone would also stop where the hose balances on an edge. So the hose is laid,
+    bent a little out of its plane, let go in a viscous fluid until it has all but come to rest,
+    and only then solved for.
 
     Raises:
         StepError: none was found.
     """
-    points = REST_POINTS
-    while True:
-        hose = make_hose("geds", own.spec, gravity=own.gravity, control_points=points)
-        put(own, hose, make_line(own))
-        try:
-            hose.solve_static()
-        except StepError:
-            if points == MOST_POINTS_OF_REST:
-                raise
-            points *= 2
-            continue
-        return lambda s: hose.position(np.clip(s, 0.0, own.spec.length))
+    spec, length = own.spec, own.spec.length
+    pace = math.sqrt(spec.bending_stiffness / spec.linear_density) / length**2
+    pace = max(_FIRST_MODE * pace, math.sqrt(float(np.linalg.norm(own.gravity)) / length))
+    thick = replace(spec, drag=2.0 * spec.linear_density * pace)
+    start = make_line(own)
+
+    def push(s: Array) -> Array:
+        aside = np.sin(2.3 * np.pi * s / length) * _PUSH * length
+        return np.asarray(start(s) + aside[:, None] * np.array([0.1, 1.0, 0.1]))
+
+    options = {"gravity": own.gravity, "control_points": REST_POINTS}
+    loose = make_hose("geds", thick, timestep=0.1 / pace, scheme="backward-euler", **options)
+    hose = make_hose("geds", spec, **options)
+    try:
+        put(own, loose, push)
+        loose.step(_STEPS_TO_REST)
+        put(own, hose, loose.position)
+    except StepError:
+        put(own, hose, start)
+    hose.solve_static()
+    return lambda s: hose.position(np.clip(s, 0.0, length))
 
 
 def is_planar(own: OwnHose) -> bool:
@@ -131,7 +151,7 @@ def find_obstacle(own: OwnHose, model: str) -> InputError | None:
     try:
         make_hose(model, own.spec, gravity=own.gravity, timestep=1e-3)
     except InputError as error:
-        return error
+        return InputError(f"hose.{error.thing}", error.value, f"for {model} {error.valid}")
     return None
 
 
@@ -154,12 +174,6 @@ def describe(own: OwnHose) -> str:
         start = "at rest" if own.start == "equilibrium" else "as laid"
         parts.append(f"It starts {start}; compared: its places over {own.duration:g} s.")
     return " ".join(parts)
-
-
-def stiffen(case: Case, own: OwnHose, factor: float) -> Case:
-    """The case of the same hose that stretches `factor` times less, its rest shape found anew."""
-    spec = replace(case.spec, axial_stiffness=factor * case.spec.axial_stiffness)
-    return make_case(replace(own, spec=spec))
 
 
 def _name_changes(hold: HeldPlace) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -23,12 +24,15 @@ def make_line(own: OwnHose) -> Line:
 
     Between two holds it is a cubic curve with the tangents of clamps, bent out along gravity until
     it is as long as the hose there; beyond the first and the last hold it is straight, and hangs
-    down from a single attachment.
+    down from a single attachment. A hose that is a coil at rest and has one hold at most is laid
+    as that coil.
     """
     if own.shape is not None:
         points = np.array(own.shape)
         along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
         return _interpolate(along * own.spec.length / along[-1], points)
+    if own.spec.rest_curvature != 0.0 and len(own.holds) <= 1:
+        return _make_coil(own)
     if not own.holds:
         return lambda s: np.outer(s, _AXES[0])
     places = [hold.arc_length for hold in own.holds]
@@ -47,6 +51,27 @@ def make_line(own: OwnHose) -> Line:
     return _interpolate(s, points)
 
 
+def _make_coil(own: OwnHose) -> Line:
+    """The helix of constant curvature K and torsion T: Darboux's vector T t + K b is its axis."""
+    turn, twist = own.spec.rest_curvature, own.spec.rest_torsion
+    origin, start, tangent = np.zeros(3), 0.0, _AXES[0]
+    if own.holds:
+        start, origin = own.holds[0].arc_length, np.array(own.holds[0].position)
+        tangent = _choose_tangents(own)[0]
+    side = _choose_side(tangent, [tangent], np.zeros(3))
+    rate = math.hypot(turn, twist)
+    axis = (twist * tangent + turn * np.cross(tangent, side)) / rate
+
+    def line(s: Array) -> Array:
+        along, angle = (s - start)[:, None], rate * (s - start)[:, None]
+        rise = axis * (axis @ tangent)
+        across, third = tangent - rise, np.cross(axis, tangent)
+        circle = across * np.sin(angle) + third * (1.0 - np.cos(angle))
+        return np.asarray(origin + rise * along + circle / rate)
+
+    return line
+
+
 def bend_between(ends: list[Array], tangents: list[Array], length: float, gravity: object) -> Array:
     """Points (k, 3) of a curve of a given length between two ends, bent out along gravity.
 
@@ -59,7 +84,7 @@ def bend_between(ends: list[Array], tangents: list[Array], length: float, gravit
     chord = ends[1] - ends[0]
     u = np.linspace(0.0, 1.0, _N)[:, None]
     steps = (u**3 - 2 * u**2 + u, 3 * u**2 - 2 * u**3, u**3 - u**2)
-    side = _choose_side(chord, tangents[0], np.asarray(gravity, dtype=float))
+    side = _choose_side(chord, tangents, np.asarray(gravity, dtype=float))
     handle = length
 
     def curve(bend: float) -> Array:
@@ -93,19 +118,19 @@ def _choose_tangents(own: OwnHose) -> list[Array]:
 
 
 def _hang(own: OwnHose, arc_length: float) -> Array:
-    """Down from an attachment, up to it where most of the hose comes before it; x without gravity."""
+    """Down from an attachment, up to it where most of the hose is before it; x without gravity."""
     size = np.linalg.norm(own.gravity)
     if size == 0.0:
-        return _AXES[0]
+        return np.array([1.0, 0.0, 0.0])
     sign = 1.0 if arc_length <= 0.5 * own.spec.length else -1.0
     return np.asarray(sign * np.array(own.gravity) / size)
 
 
-def _choose_side(chord: Array, tangent: Array, gravity: Array) -> Array:
-    """The direction across a chord in which a slack hose hangs out: of gravity as far as it goes."""
+def _choose_side(chord: Array, tangents: list[Array], gravity: Array) -> Array:
+    """The direction across a chord in which a slack hose hangs out: along gravity if it can."""
     size = np.linalg.norm(chord)
-    along = chord / size if size > 0.0 else tangent
-    for aim in (gravity / (np.linalg.norm(gravity) or 1.0), *_AXES):
+    along = chord / size if size > 0.0 else tangents[0]
+    for aim in (gravity / (np.linalg.norm(gravity) or 1.0), tangents[0] - tangents[-1], *_AXES):
         across = aim - (aim @ along) * along
         if np.linalg.norm(across) > 0.05:
             return np.asarray(across / np.linalg.norm(across))

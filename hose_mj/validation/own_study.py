@@ -15,6 +15,7 @@ from hose_mj.validation.case import Case
 from hose_mj.validation.compare import CaseResult, find_cheapest
 from hose_mj.validation.own_hose import CASE_ID, find_obstacle, make_case
 from hose_mj.validation.run import (
+    REFERENCE_POINTS,
     Outcome,
     Reference,
     Skipped,
@@ -38,7 +39,7 @@ from hose_mj.validation.settings import (
 OWN_MODELS = ("geds", "cable", "flex")
 """Models that a user's hose is compared with, those of them that there are."""
 GRID = Grid(
-    static={"geds": (8, 12, 16, 24, 32, 48), "cable": (10, 20, 40), "flex": (10, 20, 40)},
+    static={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40), "flex": (10, 20, 40)},
     dynamic={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40, 80), "flex": (10, 20, 40, 80)},
     schemes={
         "geds": ("bdf2", "bdf2, planar"),
@@ -60,6 +61,8 @@ _TIGHTER = 5.0
 """A reference is to be this many times closer to its limit than the smallest wanted error."""
 _SHARE_OF_REFERENCE, _SHARE_OF_RUN = 0.3, 0.08
 """Of the budget: for the references, and for a single run."""
+_EXTRA = 0.1
+"""Of the budget: what timing may take beyond it."""
 _ENOUGH = 2
 """Resolutions within the smallest wanted error, after which finer ones are left out."""
 
@@ -149,9 +152,7 @@ def list_own_models() -> tuple[str, ...]:
     return tuple(model for model in OWN_MODELS if model in MODELS)
 
 
-def run_own_study(
-    own: OwnHose, models: Sequence[str], advance: Callable[[str], None]
-) -> OwnStudy:
+def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], None]) -> OwnStudy:
     """Compares the models on a user's hose within about its budget.
 
     Raises:
@@ -191,7 +192,7 @@ def list_answers(
     answers = []
     for at_error in errors:
         for model, planar in kinds:
-            best = find_cheapest(outcomes, model, at_error, planar=planar)
+            best = _find_best(outcomes, model, at_error, planar)
             answer = Answer(at_error, model, planar)
             if best is not None:
                 setting = best.setting
@@ -205,6 +206,19 @@ def list_answers(
                 )
             answers.append(answer)
     return answers
+
+
+def _find_best(
+    outcomes: list[Outcome], model: str, at_error: float, planar: bool
+) -> Outcome | None:
+    """The cheapest run within an error; of rest shapes, whose cost says little, the coarsest."""
+    if any(outcome.sim_s is not None for outcome in outcomes):
+        return find_cheapest(outcomes, model, at_error, planar=planar)
+    by_size = sorted(outcomes, key=lambda outcome: outcome.setting.resolution)
+    for outcome in by_size:
+        if find_cheapest([outcome], model, at_error, planar=planar) is not None:
+            return outcome
+    return None
 
 
 def list_disagreements(outcomes: list[Outcome], length: float) -> list[Disagreement]:
@@ -240,7 +254,8 @@ def _find_references(
     own, case = study.own, study.result.case
     goal = min(own.errors) / _TIGHTER
     until = time.perf_counter() + own.budget * _SHARE_OF_REFERENCE
-    points, level = 48, 0
+    points, level = REFERENCE_POINTS * (2 if case.motion is None else 1), 0
+    n_references = 2 if set(models) - {"geds"} else 1
     while True:
         advance(f"reference, {points} control points")
         begun = time.perf_counter()
@@ -250,10 +265,10 @@ def _find_references(
         # The next one has twice the points and half the steps.
         if reference.uncertainty <= goal or 2 * points > MOST_REFERENCE_POINTS:
             break
-        if now + 4.0 * (now - begun) > until:
+        if now + 4.0 * n_references * (now - begun) > until:
             break
         points, level = 2 * points, level + 1
-    if set(models) - {"geds"}:
+    if n_references == 2:
         advance("reference that does not stretch")
         study.result.inextensible = _compute_limit(case, points, level, stretchable=False)
         gap = compute_distance(reference.values, study.result.inextensible.values)
@@ -277,9 +292,7 @@ def _compute_limit(case: Case, points: int, level: int, *, stretchable: bool) ->
     return Reference(shapes[0], compute_distance(*shapes) / case.scale)
 
 
-def _run_statics(
-    study: OwnStudy, models: tuple[str, ...], advance: Callable[[str], None]
-) -> None:
+def _run_statics(study: OwnStudy, models: tuple[str, ...], advance: Callable[[str], None]) -> None:
     case, result = study.result.case, study.result
     for setting in list_static(case, models, GRID):
         advance(setting.label)
@@ -301,24 +314,18 @@ def _run_motion(
     for ladder in ladders:
         setting = ladder[0]
         advance(f"{setting.model}, {setting.resolution}")
-        why = None
-        if time.perf_counter() > deadline:
-            why = f"the budget of {own.budget:g} s was spent"
-        elif _count_enough(result.outcomes, setting, min(own.errors)) >= _ENOUGH:
+        if _count_enough(result.outcomes, setting, min(own.errors)) >= _ENOUGH:
             why = "coarser ones are within the smallest wanted error"
-        if why is not None:
             result.skipped.append(Skipped(CASE_ID, setting, why))
             continue
-        outcomes, skipped = run_ladder(result.case, ladder, result.stretchable, grid)
+        outcomes, skipped = run_ladder(result.case, ladder, result.stretchable, grid, deadline)
         result.outcomes += outcomes
         result.skipped += skipped
     advance("timing")
-    time_rounds(result.case, result.outcomes, grid, own.errors)
+    time_rounds(result.case, result.outcomes, grid, own.errors, deadline + _EXTRA * own.budget)
 
 
-def list_own_steps(
-    model: str, scheme: str, resolution: int, case: Case, grid: Grid
-) -> list[float]:
+def list_own_steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:
     """Time steps (s) that divide the pause between samples, each half of the one before."""
     assert case.motion is not None
     pause = case.motion.pause

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -200,9 +201,16 @@ def stiffen(case: Case) -> Case:
 
 
 def run_ladder(
-    case: Case, ladder: list[Setting], reference: Reference, grid: Grid
+    case: Case,
+    ladder: list[Setting],
+    reference: Reference,
+    grid: Grid,
+    until: float = math.inf,
 ) -> tuple[list[Outcome], list[Skipped]]:
-    """Runs one model and resolution down its time steps, from the largest stable one on."""
+    """Runs one model and resolution down its time steps, from the largest stable one on.
+
+    No run starts after `until`, a reading of `time.perf_counter`.
+    """
     outcomes: list[Outcome] = []
     skipped: list[Skipped] = []
     for setting in ladder:
@@ -214,6 +222,9 @@ def run_ladder(
             assert last is not None
             if setting.timestep > 0.51 * last:
                 continue
+        if time.perf_counter() > until:
+            skipped.append(Skipped(case.id, setting, "the budget was spent"))
+            break
         why = _foresee(case, setting, grid)
         outcome = None
         if why is None:
@@ -275,9 +286,16 @@ def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:
 
 
 def time_rounds(
-    case: Case, outcomes: list[Outcome], grid: Grid, levels: Sequence[float] = EQUAL_ERRORS
+    case: Case,
+    outcomes: list[Outcome],
+    grid: Grid,
+    levels: Sequence[float] = EQUAL_ERRORS,
+    until: float = math.inf,
 ) -> None:
-    """Times the runs that could be cheapest again, unread, all models in turn; the least counts."""
+    """Times the runs that could be cheapest again, unread, all models in turn; the least counts.
+
+    No run starts after `until`, a reading of `time.perf_counter`.
+    """
     contenders = [
         outcome
         for kind in dict.fromkeys(map(_kind, outcomes))
@@ -287,7 +305,7 @@ def time_rounds(
     contenders = list({id(outcome): outcome for outcome in contenders}.values())
     for _ in range(grid.rounds):
         for outcome in contenders:
-            if outcome.wall_s < grid.longest_timed_run:
+            if outcome.wall_s < grid.longest_timed_run and time.perf_counter() < until:
                 outcome.wall_s = min(outcome.wall_s, time_run(case, outcome.setting.make(case)))
 
 

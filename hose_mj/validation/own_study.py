@@ -277,7 +277,7 @@ def _find_references(
 
 def _compute_limit(case: Case, points: int, level: int, *, stretchable: bool) -> Reference:
     if case.motion is not None:
-        parts = 2 ** max(1, math.ceil(math.log2(case.motion.pause / REFERENCE_STEP)))
+        parts = _count_parts(case.motion.pause, REFERENCE_STEP)
         steps = 4 * parts * 2**level
         grid = replace(GRID, reference_steps=(steps, steps))
         return compute_reference(case, grid, stretchable=stretchable, points=points)
@@ -329,13 +329,18 @@ def list_own_steps(model: str, scheme: str, resolution: int, case: Case, grid: G
     """Time steps (s) that divide the pause between samples, each half of the one before."""
     assert case.motion is not None
     pause = case.motion.pause
-    first = pause / 2 ** max(1, math.ceil(math.log2(pause / LARGEST_STEP)))
+    first = pause / _count_parts(pause, LARGEST_STEP)
     least, most = grid.smallest_geds_step, math.inf
     if model != "geds":
         least, most = SMALLEST_STEP, find_largest_step(scheme, resolution, case)
     count = max(1, math.floor(math.log2(first / least)) + 1)
     steps = [first / 2**k for k in range(count)]
     return [step for step in steps if step < most] or steps[-1:]
+
+
+def _count_parts(pause: float, longest: float) -> int:
+    """The power of two, 2 at least, that cuts a pause into steps no longer than `longest` (s)."""
+    return int(2 ** max(1, math.ceil(math.log2(pause / longest) - 1e-9)))
 
 
 def _rank(setting: Setting, grid: Grid) -> tuple[bool, int]:

@@ -104,6 +104,11 @@ def describe_findings(study: OwnStudy) -> list[str]:
             f"{name_model(gap.model)}{clamp[gap.clamp_corrected]}: at its finest it stays within "
             f"{_millimetres(gap.distance)} ({_percent(gap.error)}) of it."
         )
+    scored = {gap.model for gap in study.disagreements}
+    for model in dict.fromkeys(answer.model for answer in study.answers):
+        reasons = [item.why for item in study.result.skipped if item.setting.model == model]
+        if model not in scored:
+            lines.append(f"{name_model(model)}: no run was scored ({reasons[-1]}).")
     if study.stretch is not None:
         lines.append(
             f"A hose that does not stretch differs by {_percent(study.stretch)}: MuJoCo's chains "

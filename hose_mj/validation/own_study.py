@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 from hose_mj.checks import Check
@@ -61,6 +61,8 @@ _TIGHTER = 5.0
 """A reference is to be this many times closer to its limit than the smallest wanted error."""
 _SHARE_OF_REFERENCE, _SHARE_OF_RUN = 0.3, 0.08
 """Of the budget: for the references, and for a single run."""
+_GROWTH = 8.0
+"""A rest shape takes a chain of twice as many segments about so many times as long."""
 _EXTRA = 0.1
 """Of the budget: what timing may take beyond it."""
 _ENOUGH = 2
@@ -174,7 +176,7 @@ def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], 
     deadline = time.perf_counter() + own.budget
     _find_references(study, running, advance)
     if case.motion is None:
-        _run_statics(study, running, advance)
+        _run_statics(study, running, deadline, advance)
     else:
         _run_motion(study, running, deadline, advance)
     study.answers = list_answers(study.result.outcomes, running, own.errors)
@@ -292,14 +294,24 @@ def _compute_limit(case: Case, points: int, level: int, *, stretchable: bool) ->
     return Reference(shapes[0], compute_distance(*shapes) / case.scale)
 
 
-def _run_statics(study: OwnStudy, models: tuple[str, ...], advance: Callable[[str], None]) -> None:
+def _run_statics(
+    study: OwnStudy, models: tuple[str, ...], deadline: float, advance: Callable[[str], None]
+) -> None:
+    """Coarse resolutions first; one that would take longer than is left goes by its coarser one."""
     case, result = study.result.case, study.result
-    for setting in list_static(case, models, GRID):
+    took: dict[tuple[str, bool | None], float] = {}
+    for setting in sorted(list_static(case, models, GRID), key=lambda s: _rank(s, GRID.static)):
+        kind = (setting.model, setting.clamp_corrected)
+        begun = time.perf_counter()
+        if begun + _GROWTH * took.get(kind, 0.0) > deadline:
+            result.skipped.append(Skipped(CASE_ID, setting, "the budget was spent"))
+            continue
         advance(setting.label)
         try:
             result.outcomes.append(score_static(case, setting, result.stretchable))
         except StepError as error:
             result.skipped.append(Skipped(CASE_ID, setting, str(error)))
+        took[kind] = time.perf_counter() - begun
 
 
 def _run_motion(
@@ -310,7 +322,7 @@ def _run_motion(
     assert result.stretchable is not None
     grid = replace(GRID, longest_run=own.budget * _SHARE_OF_RUN)
     ladders = list(list_ladders(result.case, models, grid, list_own_steps))
-    ladders.sort(key=lambda ladder: _rank(ladder[0], grid))
+    ladders.sort(key=lambda ladder: _rank(ladder[0], grid.dynamic))
     for ladder in ladders:
         setting = ladder[0]
         advance(f"{setting.model}, {setting.resolution}")
@@ -343,9 +355,9 @@ def _count_parts(pause: float, longest: float) -> int:
     return int(2 ** max(1, math.ceil(math.log2(pause / longest) - 1e-9)))
 
 
-def _rank(setting: Setting, grid: Grid) -> tuple[bool, int]:
-    resolutions = grid.dynamic[setting.model]
-    return setting.clamp_corrected is False, resolutions.index(setting.resolution)
+def _rank(setting: Setting, resolutions: Mapping[str, tuple[int, ...]]) -> tuple[bool, int]:
+    place = resolutions[setting.model].index(setting.resolution)
+    return setting.clamp_corrected is False, place
 
 
 def _count_enough(outcomes: list[Outcome], like: Setting, error: float) -> int:

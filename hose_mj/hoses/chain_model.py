@@ -72,7 +72,12 @@ class ChainModel:
             if not item.rigid:
                 (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
                 add_equality(maker, bodies[index], along, item, settings.hold_options())
-        self.model = maker.compile()
+        try:
+            self.model = maker.compile()
+        except ValueError as error:
+            light = f"heavier segments than {settings.segments} of this hose"
+            valid = f"{light} (MuJoCo: {' '.join(str(error).split())})"
+            raise InputError("linear_density", spec.linear_density, valid) from error
         self.data = mujoco.MjData(self.model)
         self.bodies = np.array([self.model.body(body.name).id for body in bodies])
         self._lead = settings.lead

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 from hose_mj.checks import Check
-from hose_mj.errors import StepError
+from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.registry import MODELS
 from hose_mj.scenes.own_hose import OwnHose
 from hose_mj.validation.case import Case
@@ -309,7 +309,7 @@ def _run_statics(
         advance(setting.label)
         try:
             result.outcomes.append(score_static(case, setting, result.stretchable))
-        except StepError as error:
+        except (InputError, StepError) as error:
             result.skipped.append(Skipped(CASE_ID, setting, str(error)))
         took[kind] = time.perf_counter() - begun
 
@@ -329,6 +329,11 @@ def _run_motion(
         if _count_enough(result.outcomes, setting, min(own.errors)) >= _ENOUGH:
             why = "coarser ones are within the smallest wanted error"
             result.skipped.append(Skipped(CASE_ID, setting, why))
+            continue
+        try:
+            setting.make(result.case)
+        except InputError as error:  # segments too light for MuJoCo
+            result.skipped.append(Skipped(CASE_ID, setting, str(error)))
             continue
         outcomes, skipped = run_ladder(result.case, ladder, result.stretchable, grid, deadline)
         result.outcomes += outcomes

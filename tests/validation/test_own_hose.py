@@ -99,6 +99,12 @@ def test_what_stays_in_a_plane(changes, planar):
     assert is_planar(replace(FLAT, **changes)) == planar
 
 
+def test_a_thread_too_light_for_mujoco_is_refused():
+    light = replace(CANTILEVER, spec=replace(STOUT, linear_density=1e-14))
+    assert "linear_density is 1e-14; valid: for cable heavier" in str(find_obstacle(light, "cable"))
+    assert find_obstacle(light, "geds") is None
+
+
 class Plain:
     """A model without a floor, whose clamps do not turn."""
 

@@ -36,7 +36,9 @@ class Args:
     records.csv, and models.rrd, a Rerun recording with the models overlaid.
     """
 
-    my_hose: Annotated[Path | None, tyro.conf.Positional] = None
+    my_hose: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[MY_HOSE.toml]")] = (
+        None
+    )
     """A hose of your own, in TOML; the examples that come with hose_mj are found by their names."""
     cases: tuple[str, ...] = ()
     """Case ids or families; all of them by default, with the checks of GEDS's own numerics."""

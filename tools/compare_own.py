@@ -15,7 +15,8 @@ from hose_mj.recording.palette import name_model
 from hose_mj.recording.plots import format_seconds
 from hose_mj.scenes.own_hose import OwnHose, read_own_hose
 from hose_mj.validation.compare import compute_ratios
-from hose_mj.validation.own_study import Answer, OwnStudy, list_own_models, run_own_study
+from hose_mj.validation.own_answers import Answer
+from hose_mj.validation.own_study import OwnStudy, list_own_models, run_own_study
 from tools.compare import MODELS
 from tools.compare_study import Study
 

@@ -11,11 +11,10 @@ from hose_mj.assets import find_asset
 from hose_mj.errors import InputError
 from hose_mj.scenes.own_hose import Floor, read_own_hose
 from hose_mj.validation import own_study
+from hose_mj.validation.own_answers import list_answers, list_disagreements
 from hose_mj.validation.own_hose import put
 from hose_mj.validation.own_study import (
     GRID,
-    list_answers,
-    list_disagreements,
     list_own_models,
     list_own_steps,
     run_own_study,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hose_mj.validation.compare import Ratio
 
 MODELS = ("geds", "cable", "hinge-chain")
+_MY_HOSE = tyro.conf.arg(metavar="[MY_HOSE.toml]")
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,7 @@ class Args:
     records.csv, and models.rrd, a Rerun recording with the models overlaid.
     """
 
-    my_hose: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[MY_HOSE.toml]")] = (
-        None
-    )
+    my_hose: Annotated[Path | None, tyro.conf.Positional, _MY_HOSE] = None
     """A hose of your own, in TOML; the examples that come with hose_mj are found by their names."""
     cases: tuple[str, ...] = ()
     """Case ids or families; all of them by default, with the checks of GEDS's own numerics."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -75,17 +75,21 @@ def print_own(study: OwnStudy) -> None:
     for name in header:
         table.add_column(name, justify="left" if name == "model" else "right")
     for answer in study.answers:
-        table.add_row(*make_answer_row(answer))
+        table.add_row(*make_answer_row(answer, study.cut_short))
     console.print()
     console.print(table)
 
 
-def make_answer_row(answer: Answer) -> list[str]:
-    """Cells: wanted error, model, resolution, time step, error, cost."""
+def make_answer_row(answer: Answer, cut_short: Collection[str]) -> list[str]:
+    """Cells: wanted error, model, resolution, time step, error, cost.
+
+    What models that were `cut_short` by the budget did not reach, they might with more of it.
+    """
     model = f"{answer.model} planar" if answer.planar else answer.model
     row = [f"{100 * answer.at_error:g} %", name_model(model)]
     if answer.error is None:
-        return [*row, "not reached", "", "", ""]
+        why = "not in the budget" if answer.model in cut_short else "not reached"
+        return [*row, why, "", "", ""]
     step = "" if answer.timestep is None else format_seconds(answer.timestep)
     cost = "" if answer.wall_s_per_sim_s is None else f"{answer.wall_s_per_sim_s:.2g}"
     return [*row, str(answer.resolution), step, f"{100 * answer.error:.2g} %", cost]

@@ -20,7 +20,8 @@ def write_own(page: Page, study: OwnStudy, ratios: Sequence[Ratio], pictures: Pi
         section.paragraph(line)
     header = ["within", "model", "resolution", "step", "error", "wall s / sim s"]
     caption = "The cheapest setting within a wanted error, as a fraction of the length."
-    section.table(header, [make_answer_row(answer) for answer in study.answers], caption)
+    rows = [make_answer_row(answer, study.cut_short) for answer in study.answers]
+    section.table(header, rows, caption)
     like = choose_ratios(ratios, study.result.case.id)
     if like:
         head = ["case", "error", "against", "GEDS is cheaper by", "GEDS at", "the other at"]

@@ -21,6 +21,7 @@ from hose_mj.validation.own_answers import (
 )
 from hose_mj.validation.own_hose import CASE_ID, find_obstacle, make_case
 from hose_mj.validation.run import (
+    BUDGET_SPENT,
     REFERENCE_POINTS,
     Outcome,
     Reference,
@@ -95,6 +96,11 @@ class OwnStudy:
     refused: dict[str, str] = field(default_factory=dict)
     answers: list[Answer] = field(default_factory=list)
     disagreements: list[Disagreement] = field(default_factory=list)
+
+    @property
+    def cut_short(self) -> set[str]:
+        """Models with settings that the budget left out."""
+        return {s.setting.model for s in self.result.skipped if s.why == BUDGET_SPENT}
 
     @property
     def checks(self) -> list[Check]:
@@ -214,7 +220,7 @@ def _run_statics(
         kind = (setting.model, setting.clamp_corrected)
         begun = time.perf_counter()
         if begun + _GROWTH * took.get(kind, 0.0) > deadline:
-            result.skipped.append(Skipped(CASE_ID, setting, "the budget was spent"))
+            result.skipped.append(Skipped(CASE_ID, setting, BUDGET_SPENT))
             continue
         advance(setting.label)
         try:
@@ -271,8 +277,9 @@ def _count_parts(pause: float, longest: float) -> int:
 
 
 def _rank(setting: Setting, resolutions: Mapping[str, tuple[int, ...]]) -> tuple[bool, int]:
+    """Raw clamps last; else by resolution, with GEDS, which all are held against, one ahead."""
     place = resolutions[setting.model].index(setting.resolution)
-    return setting.clamp_corrected is False, place
+    return setting.clamp_corrected is False, place - (setting.model == "geds")
 
 
 def _count_enough(outcomes: list[Outcome], like: Setting, error: float) -> int:

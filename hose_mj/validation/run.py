@@ -28,6 +28,8 @@ N_CONTENDERS = 2
 """Runs of each model that are timed again at each of these errors."""
 REFERENCE_POINTS = 48
 """Control points of the references of the cases."""
+BUDGET_SPENT = "the budget was spent"
+"""Why a run did not start any more."""
 N_DRAWN = 41
 """Points along the hose that are kept for pictures."""
 
@@ -223,7 +225,7 @@ def run_ladder(
             if setting.timestep > 0.51 * last:
                 continue
         if time.perf_counter() > until:
-            skipped.append(Skipped(case.id, setting, "the budget was spent"))
+            skipped.append(Skipped(case.id, setting, BUDGET_SPENT))
             break
         why = _foresee(case, setting, grid)
         outcome = None

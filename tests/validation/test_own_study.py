@@ -131,6 +131,7 @@ def test_a_spent_budget_leaves_runs_out_and_says_so():
     assert study.result.skipped
     assert {item.why for item in study.result.skipped} == {"the budget was spent"}
     assert all(isinstance(item, Skipped) for item in study.result.skipped)
+    assert study.cut_short == {"geds", "cable"}
     assert all(answer.setting is None for answer in study.answers)
 
 

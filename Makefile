@@ -18,6 +18,7 @@ NEXT := $(NEXT_VENV)/.installed
 
 help:
 	@echo 'make demo        install, then compare the hose models in short form (report in out/demo)'
+	@echo '                 and on a garden hose (report in out/demo/garden_hose)'
 	@echo 'make test        install with the dev extra, then ruff, mypy and pytest'
 	@echo '                 PYTEST_ARGS="tests/tools -x" goes to pytest'
 	@echo 'make test-slow   only the slow tests, which make test leaves out'
@@ -31,6 +32,7 @@ help:
 # Status 1 means that a check failed, which the table shows: the report is there all the same.
 demo: $(CORE)
 	$(BIN)/hose-mj compare --quick --out out/demo || test $$? -eq 1
+	$(BIN)/hose-mj compare garden_hose --out out/demo/garden_hose || test $$? -eq 1
 
 test: lint
 	$(BIN)/python -m pytest $(PYTEST_ARGS)

@@ -17,13 +17,15 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOORS = {
     "hose_mj": {"hose_mj.errors", "hose_mj.hoses.registry", "hose_mj.hoses.spec"},
     "hose_mj.errors": set(),
+    "hose_mj.assets": {"hose_mj.errors"},
     "hose_mj.checks": {"hose_mj.errors"},
     "hose_mj.recording": {"hose_mj.errors", "hose_mj.checks"},
     "hose_mj.hoses.spec": {"hose_mj.errors"},
     "hose_mj.hoses": {"hose_mj.errors", "hose_mj.hoses.spec"},
-    "hose_mj.scenes": {"hose_mj.errors", "hose_mj.hoses.spec"},
+    "hose_mj.scenes": {"hose_mj.assets", "hose_mj.errors", "hose_mj.hoses.spec"},
     "hose_mj.validation": {
         *("hose_mj.errors", "hose_mj.checks", "hose_mj.hoses", "hose_mj.hoses.spec"),
+        "hose_mj.scenes",
     },
     "hose_mj.world": {"hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes"},
     "hose_mj.constraints": {

@@ -49,6 +49,25 @@ def test_every_asset_is_inside(wheel):
     assert {f"hose_mj/{name}" for name in listed} <= names
 
 
+def test_the_materials_are_found_in_the_wheel(wheel, tmp_path):
+    zipfile.ZipFile(wheel).extractall(tmp_path)
+    code = (
+        "from hose_mj.assets import find_assets; from hose_mj.scenes.own_hose import read_own_hose;"
+        "print(find_assets(), read_own_hose(find_assets() / 'hoses' / 'usb_cable.toml').title)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "hose_mj" / "assets"
+    assert done.stdout.strip() == f"{folder} USB cable between two plugs"
+
+
 def test_the_doctor_runs_from_the_wheel(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path)
     code = (

@@ -25,7 +25,9 @@ class Command:
 
 
 COMMANDS = {
-    "compare": Command("tools.compare", "measure the hose models against closed forms"),
+    "compare": Command(
+        "tools.compare", "measure the hose models against closed forms, or on your own hose"
+    ),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
 }
 

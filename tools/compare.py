@@ -1,4 +1,4 @@
-"""`hose-mj compare`: GEDS against MuJoCo's cable and closed forms."""
+"""`hose-mj compare`: GEDS against MuJoCo's cable and closed forms, or on a user's own hose."""
 
 from __future__ import annotations
 
@@ -18,20 +18,27 @@ from hose_mj.errors import InputError
 from tools.document import make_document, print_document
 
 if TYPE_CHECKING:
+    from hose_mj.scenes.own_hose import OwnHose
     from hose_mj.validation.case import Case
     from hose_mj.validation.compare import Ratio
 
 MODELS = ("geds", "cable", "flex", "hinge-chain")
+_MY_HOSE = tyro.conf.arg(metavar="[MY_HOSE.toml]")
 
 
 @dataclass(frozen=True)
 class Args:
     """Compare the GEDS hose with MuJoCo's cable and flex and with closed forms.
 
+    With a file that describes your own hose (docs/own_hose.md), compare the models on that hose
+    instead: how far they disagree, how fine each must be for a wanted error, what that costs.
+
     Writes report.html (self-contained), plots as PNG, the numbers as records.parquet and
     records.csv, and models.rrd, a Rerun recording with the models overlaid.
     """
 
+    my_hose: Annotated[Path | None, tyro.conf.Positional, _MY_HOSE] = None
+    """A hose of your own, in TOML; the examples that come with hose_mj are found by their names."""
     cases: tuple[str, ...] = ()
     """Case ids or families; all of them by default, with the checks of GEDS's own numerics."""
     models: Annotated[tuple[str, ...], tyro.conf.arg(metavar="{geds,cable,flex,hinge-chain}")] = (
@@ -41,7 +48,8 @@ class Args:
     out: Path = Path("out/compare")
     """Folder for the report, the plots, the numbers and the recording."""
     quick: bool = False
-    """A smaller grid: the cable at 20 and 40 segments, under 45 s once compiled."""
+    """A smaller grid: the cable at 20 and 40 segments, under 45 s once compiled. For your own hose:
+    a third of its budget."""
     json: bool = False
     """Print one JSON document on stdout; messages go to stderr."""
     seed: int = 0
@@ -51,29 +59,38 @@ class Args:
 def run(args: Args) -> int:
     """Runs the comparison; 1 if a check failed."""
     from tools.compare_output import write_all
+    from tools.compare_own import choose_own_models, print_own, study_own_hose
     from tools.compare_study import run_study
 
-    cases = check_arguments(args)
+    own = None if args.my_hose is None else check_own_arguments(args, args.my_hose)
+    cases = check_arguments(args) if own is None else ()
     begun = time.perf_counter()
     with show_progress() as advance:
-        study = run_study(
-            cases,
-            tuple(dict.fromkeys(args.models)),
-            quick=args.quick,
-            seed=args.seed,
-            with_numerics=not args.cases and "geds" in args.models,
-            advance=advance,
-        )
+        if own is not None:
+            study = study_own_hose(own, choose_own_models(args.models), advance)
+        else:
+            study = run_study(
+                cases,
+                tuple(dict.fromkeys(args.models)),
+                quick=args.quick,
+                seed=args.seed,
+                with_numerics=not args.cases and "geds" in args.models,
+                advance=advance,
+            )
         results = {
             "records": [outcome.to_record() for outcome in study.outcomes],
             "ratios": [asdict(ratio) for ratio in study.ratios],
-            "skipped": [item.to_record() for item in study.skipped],
+            "skipped": study.list_skipped(),
         }
+        if study.own is not None:
+            results |= study.own.to_results()
         document = make_document("compare", args, checks=study.checks, results=results)
         advance("report")
         report = write_all(study, document, args.out)
     if args.json:
         print_document(document)
+    elif study.own is not None:
+        print_own(study.own)
     else:
         _summarize(study.checks, study.ratios)
     failed = [check for check in study.checks if not check.ok]
@@ -97,21 +114,51 @@ def check_arguments(args: Args) -> tuple[Case, ...]:
             raise InputError("model", model, ", ".join(MODELS))
     if not args.models:
         raise InputError("models", args.models, f"one or more of {', '.join(MODELS)}")
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
+    _check_seed(args.seed)
     found = find_cases(args.cases)
     cases = tuple(case for case in found if set(case.models) & set(args.models))
     if not cases:
         run_with = dict.fromkeys(model for case in found for model in case.models)
         raise InputError("models", args.models, f"for these cases one of {', '.join(run_with)}")
+    make_folder(args.out)
+    return cases
+
+
+def check_own_arguments(args: Args, path: Path) -> OwnHose:
+    """Returns the user's hose; makes the folder `out`.
+
+    Raises:
+        InputError: something wrong in the file, an unknown model, a bad seed or folder; cases.
+    """
+    from tools.compare_own import choose_own_models, read_own
+
+    if args.cases:
+        raise InputError("cases", args.cases, "none beside a hose of your own")
+    choose_own_models(args.models)
+    _check_seed(args.seed)
+    own = read_own(path, quick=args.quick)
+    make_folder(args.out)
+    return own
+
+
+def _check_seed(seed: int) -> None:
+    if seed < 0:
+        raise InputError("seed", seed, "a whole number, at least 0")
+
+
+def make_folder(out: Path) -> None:
+    """Makes the folder `out` unless it is there.
+
+    Raises:
+        InputError: it cannot be made or written to.
+    """
     try:
-        args.out.mkdir(parents=True, exist_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         valid = f"a folder, or a place where one can be made ({error.strerror})"
-        raise InputError("out", str(args.out), valid) from error
-    if not os.access(args.out, os.W_OK):
-        raise InputError("out", str(args.out), "a folder that you may write to")
-    return cases
+        raise InputError("out", str(out), valid) from error
+    if not os.access(out, os.W_OK):
+        raise InputError("out", str(out), "a folder that you may write to")
 
 
 @contextmanager

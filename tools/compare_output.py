@@ -35,9 +35,10 @@ def write_all(study: Study, document: dict[str, Any], folder: Path) -> Path:
     pictures = draw_all(study)
     for name, png in pictures.items():
         write_atomically(folder / "plots" / f"{name}.png", png)
-    motions = [result for result in study.results if result.case.motion is not None]
+    motions = [result for result in study.results if study.own or result.case.motion is not None]
     motions.sort(key=lambda result: result.case.id != HERO)  # the first is the one in view
-    scenes = [scene for scene in map(make_scene, motions) if scene is not None]
+    made = [make_scene(result, study.shown_within) for result in motions]
+    scenes = [scene for scene in made if scene is not None]
     if scenes:
         settings = {str(k): str(v) for k, v in document["settings"].items()}
         settings["revision"] = str(document["revision"])
@@ -45,9 +46,9 @@ def write_all(study: Study, document: dict[str, Any], folder: Path) -> Path:
     return make_report(study, document, pictures, folder / "report.html")
 
 
-def make_scene(result: CaseResult) -> Scene | None:
+def make_scene(result: CaseResult, within: float) -> Scene | None:
     """The models of a motion overlaid, with their distances from GEDS; None without a run."""
-    shown = choose_shown(result)
+    shown = choose_shown(result, within)
     if not shown:
         return None
     case = result.case

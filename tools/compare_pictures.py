@@ -10,7 +10,7 @@ import numpy as np
 from hose_mj.recording import plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import Outcome
-from tools.compare_study import Study
+from tools.compare_study import SHOWN_WITHIN, Study
 
 Pictures = dict[str, bytes]
 """PNG by file name without its suffix."""
@@ -34,12 +34,14 @@ def draw_all(study: Study) -> Pictures:
     pictures: Pictures = {}
     for result in study.results:
         if result.case.motion is not None and result.outcomes:
-            pictures.update(_draw_motion(result, study.ratios))
+            pictures.update(_draw_motion(result, study.ratios, study.shown_within))
             if result.case.id == HERO and _has_hero_models(result):
                 pictures["overview"] = draw_overview(result, study.ratios)
     for family, members in group_statics(study.results).items():
         pictures.update(_draw_statics(family, members))
     pictures.update(_draw_numerics(study))
+    if study.own is not None and study.own.own.duration is None and study.outcomes:
+        pictures.update(_draw_rest(study.results[0], study.shown_within))
     return pictures
 
 
@@ -52,11 +54,11 @@ def group_statics(results: list[CaseResult]) -> dict[str, list[CaseResult]]:
     return groups
 
 
-def choose_shown(result: CaseResult) -> dict[str, Outcome]:
-    """The run of each model that pictures show: the cheapest within 1 %, or the best."""
+def choose_shown(result: CaseResult, within: float) -> dict[str, Outcome]:
+    """The run of each model that pictures show: the cheapest within an error, or the best."""
     shown = {}
     for model in dict.fromkeys(outcome.setting.model for outcome in result.outcomes):
-        best = find_cheapest(result.outcomes, model, 0.01)
+        best = find_cheapest(result.outcomes, model, within)
         if best is None:
             mine = [outcome for outcome in result.outcomes if outcome.setting.model == model]
             best = min(mine, key=lambda outcome: outcome.error)
@@ -80,7 +82,8 @@ def describe_setting(outcome: Outcome) -> str:
     """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
     setting = outcome.setting
     size = "control points" if setting.model == "geds" else "segments"
-    return f"{setting.model}, {setting.resolution} {size}, {name_setting(outcome).split(', ')[-1]}"
+    step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
+    return f"{setting.model}, {setting.resolution} {size}{step}"
 
 
 def name_series(outcome: Outcome) -> str:
@@ -100,7 +103,7 @@ def choose_ratios(ratios: Iterable[Ratio], case_id: str) -> list[Ratio]:
 
 def draw_overview(result: CaseResult, ratios: list[Ratio]) -> bytes:
     """The motion at the left, errors and costs at the right: the picture of the README."""
-    shown = {m: o for m, o in choose_shown(result).items() if m in ("geds", "cable")}
+    shown = {m: o for m, o in choose_shown(result, SHOWN_WITHIN).items() if m in ("geds", "cable")}
     curves, times = _pick_snapshots(shown)
     names = [o.setting.resolution for o in shown.values()]
     left = "A rod is let go"
@@ -160,19 +163,38 @@ def _pick_snapshots(shown: dict[str, Outcome]) -> tuple[dict[str, np.ndarray], l
     return curves, [float(one.times[k]) for k in picks]
 
 
-def _draw_motion(result: CaseResult, ratios: list[Ratio]) -> Pictures:
+def _draw_motion(result: CaseResult, ratios: list[Ratio], within: float) -> Pictures:
     case = result.case
     pictures = {
         f"{case.id}-work-precision": plots.plot_work_precision(
             case.title, _list_work(result), _list_gaps(result, ratios)
         )
     }
-    shown = choose_shown(result)
+    shown = choose_shown(result, within)
     curves, times = _pick_snapshots(shown)
-    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, times=times)
+    plane = choose_plane(curves.values())
+    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, plane, times=times)
     if "geds" in shown and len(shown) > 1:
         pictures[f"{case.id}-distance"] = _draw_distance(shown)
     return pictures
+
+
+def _draw_rest(result: CaseResult, within: float) -> Pictures:
+    """The rest shape that each model finds where it comes closest."""
+    curves = {
+        describe_setting(outcome): outcome.points
+        for outcome in choose_shown(result, within).values()
+    }
+    picture = plots.plot_shapes(result.case.title, curves, choose_plane(curves.values()))
+    return {f"{result.case.id}-shapes": picture}
+
+
+def choose_plane(curves: Iterable[np.ndarray]) -> tuple[int, int]:
+    """The two coordinates that show most of curves (..., 3): x or y over z, or x over y if flat."""
+    extent = np.ptp(np.concatenate([curve.reshape(-1, 3) for curve in curves]), axis=0)
+    if extent[2] < 0.1 * min(extent[:2]):
+        return 0, 1
+    return (0, 2) if extent[0] >= extent[1] else (1, 2)
 
 
 def _draw_distance(shown: dict[str, Outcome]) -> bytes:

@@ -2,49 +2,50 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hose_mj.recording.page import Block, Page, Picture, Section
+from hose_mj.recording.page import Page, Picture, Section
 from hose_mj.recording.palette import name_model
-from hose_mj.recording.plots import format_seconds
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
-from hose_mj.validation.run import EQUAL_ERRORS, Outcome
+from hose_mj.validation.run import EQUAL_ERRORS
+from tools.compare_own_page import write_own
 from tools.compare_pictures import (
     HERO,
     Pictures,
     choose_ratios,
     group_statics,
-    name_setting,
 )
 from tools.compare_study import Study
+from tools.compare_tables import HEADER, TIMES, make_ratio_row, make_row, write_runs
 from tools.compare_texts import write_method, write_physics
 
-_TIMES = "\u00d7"
-_HEADER = ["model", "resolution", "step", "scheme", "clamp", "error", "wall s / sim s", "fallbacks"]
 _STATIC_COLUMNS = (0, 1, 2, 5, 6)
-"""Columns of case and `_HEADER` that a static case fills."""
+"""Columns of case and `HEADER` that a static case fills."""
 
 
 def make_report(study: Study, document: dict[str, Any], pictures: Pictures, path: Path) -> Path:
     """Writes the page and returns its path."""
     machine = document["machine"]
     page = Page(
-        "GEDS against MuJoCo's cable and closed forms",
+        study.own.own.title if study.own else "GEDS against MuJoCo's cable and closed forms",
         subtitle=f"hose-mj {document['version']}, revision {str(document['revision'])[:12]}",
         footer=f"{machine['cpu']}, {machine['cores']} cores, {machine['os']}, "
         f"Python {machine['python']}, seed {document['seed']}",
     )
-    _write_glance(page, study, pictures)
-    write_physics(page)
-    _write_motions(page, study, pictures)
-    _write_statics(page, study, pictures)
-    _write_numerics(page, pictures)
-    write_method(page, study.quick)
+    if study.own is not None:
+        write_own(page, study.own, study.ratios, pictures)
+        write_physics(page)
+    else:
+        _write_glance(page, study, pictures)
+        write_physics(page)
+        _write_motions(page, study, pictures)
+        _write_statics(page, study, pictures)
+        _write_numerics(page, pictures)
+        write_method(page, study.quick)
     page.write(path)
     return path
 
@@ -90,7 +91,7 @@ def _write_verdict(section: Section, ratios: Sequence[Ratio]) -> None:
     for level in EQUAL_ERRORS:
         found = [r for r in choose_ratios(ratios, case) if r.at_error == level]
         if found:
-            texts = [f"the {name_model(r.against)} **{r.wall_ratio:.3g}{_TIMES}**" for r in found]
+            texts = [f"the {name_model(r.against)} **{r.wall_ratio:.3g}{TIMES}**" for r in found]
             parts.append(f"at {100 * level:g} % error {' and '.join(texts)}")
     name = case.replace("-", " ").capitalize()
     section.paragraph(f"{name}, wall time over that of GEDS: {'; '.join(parts)}.")
@@ -105,24 +106,11 @@ def _write_ratios(section: Section, study: Study) -> None:
             "Wall time at equal error, every model at its cheapest setting of the grid; like "
             "against like: space against the cable and the flex, plane against the hinge chain."
         )
-        section.table(header, [_ratio_row(ratio) for ratio in like], caption)
+        section.table(header, [make_ratio_row(ratio) for ratio in like], caption)
     rest = [ratio for ratio in study.ratios if ratio not in like]
     if rest:
         fold = section.fold(f"{len(rest)} more ratios, space against plane")
-        fold.table(header, [_ratio_row(ratio) for ratio in rest])
-
-
-def _ratio_row(ratio: Ratio) -> list[object]:
-    labels = (ratio.model_setting, ratio.against_setting)
-    ours, theirs = (_shorten_label(label).partition(", ")[2] for label in labels)
-    level, times = f"{100 * ratio.at_error:g} %", f"{ratio.wall_ratio:.3g}{_TIMES}"
-    return [ratio.case, level, ratio.against, times, ours, theirs]
-
-
-def _shorten_label(label: str) -> str:
-    """A label without what goes without saying, and "0.833333 ms" written as "833 \u00b5s"."""
-    label = label.removesuffix(", clamp-corrected").replace("control ", "")
-    return re.sub(r"([\d.]+) ms", lambda m: format_seconds(1e-3 * float(m[1])), label)
+        fold.table(header, [make_ratio_row(ratio) for ratio in rest])
 
 
 def _write_motions(page: Page, study: Study, pictures: Pictures) -> None:
@@ -160,15 +148,15 @@ def _write_motion(section: Section, result: CaseResult, pictures: Pictures) -> N
     if pair:
         block.figures(pair)
     rows = [
-        [f"{100 * at_error:g} %", *_row(best)]
+        [f"{100 * at_error:g} %", *make_row(best)]
         for at_error in EQUAL_ERRORS
         for model in case.models
         for planar in ((False, True) if model == "geds" else (False,))
         if (best := find_cheapest(result.outcomes, model, at_error, planar=planar)) is not None
     ]
     if rows:
-        block.table(["within", *_HEADER], rows, "Cheapest settings.")
-    _write_runs(block, result)
+        block.table(["within", *HEADER], rows, "Cheapest settings.")
+    write_runs(block, result)
 
 
 def _describe_references(result: CaseResult) -> str:
@@ -193,31 +181,6 @@ def _describe_references(result: CaseResult) -> str:
     return text
 
 
-def _row(outcome: Outcome) -> list[Any]:
-    setting = outcome.setting
-    clamp = {None: "", True: "corrected", False: "raw"}[setting.clamp_corrected]
-    wall = outcome.wall_s_per_sim_s
-    return [
-        setting.model,
-        setting.resolution,
-        "" if setting.timestep is None else name_setting(outcome).split(", ")[-1],
-        setting.scheme,
-        clamp,
-        f"{100 * outcome.error:.3g} %",
-        "" if wall is None else f"{wall:.3g}",
-        outcome.fallbacks,
-    ]
-
-
-def _write_runs(block: Block, result: CaseResult) -> None:
-    if result.outcomes:
-        fold = block.fold(f"All {len(result.outcomes)} runs")
-        fold.table(_HEADER, [_row(outcome) for outcome in result.outcomes], "")
-    if result.skipped:
-        fold = block.fold(f"{len(result.skipped)} settings not scored")
-        fold.table(["setting", "why"], [[s.setting.label, s.why] for s in result.skipped], "")
-
-
 def _write_statics(page: Page, study: Study, pictures: Pictures) -> None:
     groups = group_statics(study.results)
     if not groups:
@@ -227,7 +190,7 @@ def _write_statics(page: Page, study: Study, pictures: Pictures) -> None:
         "A panel for each model, a line for each parameter, error over resolution. Dotted lines "
         "through hollow marks have MuJoCo's clamp as documented."
     )
-    header = ["case", *_HEADER]
+    header = ["case", *HEADER]
     for family, members in groups.items():
         block = section.subsection(family.replace("-", " ").capitalize())
         block.paragraph(members[0].case.about)
@@ -241,7 +204,7 @@ def _write_statics(page: Page, study: Study, pictures: Pictures) -> None:
             block.figures(drawn)
         elif drawn:
             block.figure(drawn[0].png, drawn[0].alt)
-        rows = [[r.case.id, *_row(o)] for r in members for o in r.outcomes]
+        rows = [[r.case.id, *make_row(o)] for r in members for o in r.outcomes]
         if rows:
             columns = [header[k] for k in _STATIC_COLUMNS]
             kept = [[row[k] for k in _STATIC_COLUMNS] for row in rows]

@@ -18,9 +18,13 @@ from hose_mj.validation.compare import (
     compute_ratios,
     run_case,
 )
+from hose_mj.validation.own_hose import CASE_ID
+from hose_mj.validation.own_study import OwnStudy
 from hose_mj.validation.run import Outcome, Skipped
 from hose_mj.validation.settings import FULL, QUICK
 
+SHOWN_WITHIN = 0.01
+"""Pictures of a case show the cheapest run of each model within this error."""
 N_RANDOM_STATES = 100_000
 N_RANDOM_STATES_QUICK = 500
 
@@ -36,6 +40,7 @@ class Study:
         curves: convergence plots by title.
         energy: times (s) and energy over its start of the ten-second swing; None if not run.
         quick: whether the small grid was used.
+        own: what was found about a user's own hose, whose runs are the one result; None without.
     """
 
     results: list[CaseResult] = field(default_factory=list)
@@ -44,6 +49,12 @@ class Study:
     curves: dict[str, numerics.Curves] = field(default_factory=dict)
     energy: tuple[list[float], list[float]] | None = None
     quick: bool = False
+    own: OwnStudy | None = None
+
+    @property
+    def shown_within(self) -> float:
+        """The error within which pictures show the cheapest runs; 0 for the closest ones."""
+        return SHOWN_WITHIN if self.own is None else 0.0
 
     @property
     def outcomes(self) -> list[Outcome]:
@@ -54,6 +65,14 @@ class Study:
     def skipped(self) -> list[Skipped]:
         """All settings that were not scored."""
         return [item for result in self.results for item in result.skipped]
+
+    def list_skipped(self) -> list[dict[str, object]]:
+        """Records of all that was not scored, models that refused a user's hose first."""
+        refused = {} if self.own is None else self.own.refused
+        models: list[dict[str, object]] = [
+            {"case": CASE_ID, "setting": model, "why": why} for model, why in refused.items()
+        ]
+        return [*models, *(item.to_record() for item in self.skipped)]
 
 
 def run_study(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from hose_mj.errors import InputError
 from hose_mj.hoses.chain_holds import (
     Held,
     Load,
@@ -73,7 +74,13 @@ class ChainModel(MujocoModel):
                 (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
                 add_equality(maker, bodies[index], along, item, settings.hold_options())
         check_segments(self.layout, held)
-        super().__init__(maker.compile(), settings.lead, _ADVICE)
+        try:
+            model = maker.compile()
+        except ValueError as error:
+            light = f"heavier segments than {settings.segments} of this hose"
+            valid = f"{light} (MuJoCo: {' '.join(str(error).split())})"
+            raise InputError("linear_density", spec.linear_density, valid) from error
+        super().__init__(model, settings.lead, _ADVICE)
         self.bodies = np.array([self.model.body(body.name).id for body in bodies])
         self._motion: ChainMotion | None = None
 

@@ -51,6 +51,11 @@ class Motion:
     n_samples: int
     drive: Callable[[HoseModel, list[Hold], float], None] | None = None
 
+    @property
+    def pause(self) -> float:
+        """Time between two samples (s)."""
+        return self.duration / self.n_samples
+
 
 @dataclass(frozen=True)
 class Case:
@@ -69,6 +74,7 @@ class Case:
         scale: what errors are a fraction of: None for the reference's own value, else a length (m).
         motion: None for static cases.
         clamped: True where one end is clamped, so that a chain's clamp can be corrected.
+        planar: True where the hose stays in a plane parallel to x and z.
         models: the models that the case is run with.
         steps: time steps of GEDS (s), coarse to fine; dynamic cases only.
         resolutions: by model, in place of the grid's; static cases only.
@@ -88,6 +94,7 @@ class Case:
     scale: float | None = None
     motion: Motion | None = None
     clamped: bool = False
+    planar: bool = True
     models: tuple[str, ...] = ("geds", "cable", "flex", "hinge-chain")
     steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
     resolutions: Mapping[str, tuple[int, ...]] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -141,13 +141,15 @@ def find_cheapest(
     return min(fits, key=lambda outcome: outcome.wall_s, default=None)
 
 
-def compute_ratios(result: CaseResult) -> list[Ratio]:
+def compute_ratios(result: CaseResult, levels: Sequence[float] = EQUAL_ERRORS) -> list[Ratio]:
     """Wall-time ratios at equal error, GEDS in space and in its plane against the others."""
     ratios = []
-    for at_error in EQUAL_ERRORS:
+    others = dict.fromkeys(outcome.setting.model for outcome in result.outcomes)
+    others.pop("geds", None)
+    for at_error in levels:
         for planar in (False, True):
             ours = find_cheapest(result.outcomes, "geds", at_error, planar=planar)
-            for against in INEXTENSIBLE:
+            for against in others:
                 theirs = find_cheapest(result.outcomes, against, at_error)
                 if ours is None or theirs is None:
                     continue

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,7 +27,9 @@ EQUAL_ERRORS = (0.01, 0.001)
 N_CONTENDERS = 2
 """Runs of each model that are timed again at each of these errors."""
 REFERENCE_POINTS = 48
-"""Control points of a reference; its uncertainty is its distance from one with three quarters."""
+"""Control points of the references of the cases."""
+BUDGET_SPENT = "the budget was spent"
+"""Why a run did not start any more."""
 N_DRAWN = 41
 """Points along the hose that are kept for pictures."""
 
@@ -105,37 +109,46 @@ def run_static(
     case: Case, models: tuple[str, ...], grid: Grid
 ) -> tuple[list[Outcome], list[Skipped]]:
     """Runs a static case with every setting of the grid; skips where no equilibrium was found."""
-    assert case.truth is not None
-    truth = case.truth()
-    outcomes = []
-    skipped = []
+    outcomes: list[Outcome] = []
+    skipped: list[Skipped] = []
     for setting in list_static(case, models, grid):
-        hose = setting.make(case)
         try:
-            case.lay(hose)
-            start = time.perf_counter()
-            values = case.probe(hose)
-            wall = time.perf_counter() - start
+            outcomes.append(score_static(case, setting))
         except StepError as failure:
             skipped.append(Skipped(case.id, setting, str(failure)))
-            continue
-        points = hose.position(_drawn(case))[None]
-        error = float(np.max(np.abs(values - truth) / (case.scale or np.abs(truth))))
-        outcomes.append(
-            Outcome(
-                case.id,
-                setting,
-                error,
-                "closed form",
-                wall,
-                None,
-                _count_fallbacks(hose),
-                np.zeros(1),
-                points,
-                values[None],
-            )
-        )
     return outcomes, skipped
+
+
+def score_static(case: Case, setting: Setting, reference: Reference | None = None) -> Outcome:
+    """One equilibrium, against its closed form or, where that is given, a converged reference.
+
+    Raises:
+        StepError: no equilibrium was found.
+    """
+    hose = setting.make(case)
+    case.lay(hose)
+    start = time.perf_counter()
+    values = case.probe(hose)
+    wall = time.perf_counter() - start
+    if reference is None:
+        assert case.truth is not None
+        truth = case.truth()
+        error = float(np.max(np.abs(values - truth) / (case.scale or np.abs(truth))))
+    else:
+        assert case.scale is not None
+        error = compute_distance(values[None], reference.values) / case.scale
+    return Outcome(
+        case.id,
+        setting,
+        error,
+        "closed form" if reference is None else "converged",
+        wall,
+        None,
+        _count_fallbacks(hose),
+        np.zeros(1),
+        hose.position(_drawn(case))[None],
+        values[None],
+    )
 
 
 def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
@@ -148,7 +161,7 @@ def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
     motion = case.motion
     holds = case.lay(hose)
     drawn = _drawn(case)
-    pause = motion.duration / motion.n_samples
+    pause = motion.pause
     n_steps = round(pause / hose.timestep)
     times, values, points = [0.0], [case.probe(hose)], [hose.position(drawn)]
     wall = 0.0
@@ -160,41 +173,55 @@ def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
     return np.array(times), np.array(values), np.array(points), wall
 
 
-def compute_reference(case: Case, grid: Grid, *, stretchable: bool) -> Reference:
+def compute_reference(
+    case: Case, grid: Grid, *, stretchable: bool, points: int = REFERENCE_POINTS
+) -> Reference:
     """The converged limit of a motion: GEDS, fine in n, extrapolated in the time step.
 
     Args:
         case: a dynamic case.
         grid: says how fine in time.
         stretchable: False for the limit of inextensible models (EA times STIFFENING).
+        points: control points; the uncertainty is the distance from three quarters of them.
     """
     motion = case.motion
     assert motion is not None
-    spec = case.spec
     if not stretchable:
-        spec = replace(spec, axial_stiffness=STIFFENING * spec.axial_stiffness)
-    case = replace(case, spec=spec)
-    pause = motion.duration / motion.n_samples
+        case = stiffen(case)
+    scheme = "bdf2, planar" if case.planar else "bdf2"
 
     def extrapolate(n: int, parts: int) -> Array:
         runs = []
         for k in (parts, 2 * parts):
-            setting = Setting("geds", "bdf2, planar", n, None, pause / k)
+            setting = Setting("geds", scheme, n, None, motion.pause / k)
             runs.append(simulate(case, setting.make(case, tolerance=1e-7))[1])
         return np.asarray((4.0 * runs[1] - runs[0]) / 3.0)
 
     # Damped and driven motions are smooth in time; the free ones ring.
     parts = grid.reference_steps[motion.drive is not None] // 2
-    fine = extrapolate(REFERENCE_POINTS, parts)
-    coarse = extrapolate(3 * REFERENCE_POINTS // 4, parts // 2)
+    fine = extrapolate(points, parts)
+    coarse = extrapolate(3 * points // 4, parts // 2)
     assert case.scale is not None
-    return Reference(fine, _distance(fine, coarse) / case.scale)
+    return Reference(fine, compute_distance(fine, coarse) / case.scale)
+
+
+def stiffen(case: Case) -> Case:
+    """The case of a hose that hardly stretches, for the limit of inextensible models."""
+    stiff = STIFFENING * case.spec.axial_stiffness
+    return replace(case, spec=replace(case.spec, axial_stiffness=stiff))
 
 
 def run_ladder(
-    case: Case, ladder: list[Setting], reference: Reference, grid: Grid
+    case: Case,
+    ladder: list[Setting],
+    reference: Reference,
+    grid: Grid,
+    until: float = math.inf,
 ) -> tuple[list[Outcome], list[Skipped]]:
-    """Runs one model and resolution down its time steps, from the largest stable one on."""
+    """Runs one model and resolution down its time steps, from the largest stable one on.
+
+    No run starts after `until`, a reading of `time.perf_counter`.
+    """
     outcomes: list[Outcome] = []
     skipped: list[Skipped] = []
     for setting in ladder:
@@ -208,7 +235,10 @@ def run_ladder(
             assert last is not None
             if setting.timestep > 0.51 * last:
                 continue
-        why = _foresee(case, setting, grid) if setting.model != "geds" else None
+        if time.perf_counter() > until:
+            skipped.append(Skipped(case.id, setting, BUDGET_SPENT))
+            break
+        why = _foresee(case, setting, grid)
         outcome = None
         if why is None:
             outcome = _score(case, setting, reference)
@@ -236,7 +266,7 @@ def _score(case: Case, setting: Setting, reference: Reference) -> Outcome | None
         times, values, points, wall = simulate(case, hose)
     except StepError:
         return None
-    error = _distance(values, reference.values) / case.scale
+    error = compute_distance(values, reference.values) / case.scale
     if not (error < LOST or (setting.model == "geds" and np.isfinite(error))):
         return None
     return Outcome(
@@ -268,18 +298,27 @@ def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:
     return f"would take {whole:.0f} s" if whole > grid.longest_run else None
 
 
-def time_rounds(case: Case, outcomes: list[Outcome], grid: Grid) -> None:
-    """Times the runs that could be cheapest again, unread, all models in turn; the least counts."""
+def time_rounds(
+    case: Case,
+    outcomes: list[Outcome],
+    grid: Grid,
+    levels: Sequence[float] = EQUAL_ERRORS,
+    until: float = math.inf,
+) -> None:
+    """Times the runs that could be cheapest again, unread, all models in turn; the least counts.
+
+    No run starts after `until`, a reading of `time.perf_counter`.
+    """
     contenders = [
         outcome
         for kind in dict.fromkeys(map(_kind, outcomes))
-        for at_error in EQUAL_ERRORS
+        for at_error in levels
         for outcome in _find_fastest(outcomes, kind, at_error)
     ]
     contenders = list({id(outcome): outcome for outcome in contenders}.values())
     for _ in range(grid.rounds):
         for outcome in contenders:
-            if outcome.wall_s < grid.longest_timed_run:
+            if outcome.wall_s < grid.longest_timed_run and time.perf_counter() < until:
                 outcome.wall_s = min(outcome.wall_s, time_run(case, outcome.setting.make(case)))
 
 
@@ -324,7 +363,7 @@ def _count_fallbacks(hose: HoseModel) -> int:
     return int(getattr(hose, "fallbacks", 0))
 
 
-def _distance(values: Array, reference: Array) -> float:
+def compute_distance(values: Array, reference: Array) -> float:
     """Largest distance between two motions' points, (k, 3 p) each (m)."""
     gap = (values - reference).reshape(len(values), -1, 3)
     return float(np.max(np.linalg.norm(gap, axis=2)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,7 +66,7 @@ class Setting:
             options.update(segments=self.resolution, clamp_correction=bool(self.clamp_corrected))
             if self.timestep is not None and self.model != "flex":
                 options.update(integrator=scheme)
-        if self.model == "cable" and self.timestep is not None:
+        if self.model == "cable" and self.timestep is not None and case.planar:
             # In a plane nothing twists: less torsional stiffness allows the cable larger steps.
             options.update(torsional_stiffness=CABLE_TWIST * case.spec.bending_stiffness)
         return make_hose(self.model, case.spec, **options)
@@ -156,6 +156,8 @@ QUICK = Grid(
 
 
 _STATICS = {"geds": "statics", "flex": "newton on vertices"}
+ListSteps = Callable[[str, str, int, Case, Grid], list[float]]
+"""Time steps to try, from a model, a scheme, a resolution, a case and a grid."""
 
 
 def list_static(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[Setting]:
@@ -167,23 +169,26 @@ def list_static(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[Set
                 yield Setting(model, scheme, resolution, corrected)
 
 
-def list_ladders(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[list[Setting]]:
+def list_ladders(
+    case: Case, models: tuple[str, ...], grid: Grid, list_steps: ListSteps | None = None
+) -> Iterator[list[Setting]]:
     """Yields, for each model, scheme and resolution, the time steps to try, coarse to fine.
 
     Raw clamps are there to be seen, not to win: they run with a model's first scheme alone. Driven
     holds leave rk4 out: with MuJoCo's soft holds it was stable at .04 ms only, with 20 segments.
     """
+    list_steps = list_steps or _steps
     driven = case.motion is not None and case.motion.drive is not None
     for model in models:
         for scheme in grid.schemes[model]:
-            if scheme == "rk4" and driven:
+            if (scheme == "rk4" and driven) or (scheme.endswith("planar") and not case.planar):
                 continue
             for resolution in grid.dynamic[model]:
                 for corrected in _clamps(model, case):
                     raw = corrected is False
                     if raw and (scheme != grid.schemes[model][0] or resolution not in RAW_CLAMPS):
                         continue
-                    steps = _steps(model, scheme, resolution, case, grid)
+                    steps = list_steps(model, scheme, resolution, case, grid)
                     yield [Setting(model, scheme, resolution, corrected, step) for step in steps]
 
 
@@ -195,7 +200,7 @@ def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> 
     """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them.
 
     An undamped chain with explicit forces need not be tried above twice its limit, known from the
-    highest frequency of a chain of rigid links (docs/mujoco_cable.md).
+    highest frequency of a chain of rigid links (docs/mujoco_cable.md): `find_largest_step`.
     """
     if model == "geds":
         return [step for step in case.steps if step >= grid.smallest_geds_step]
@@ -203,9 +208,13 @@ def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> 
     while STEP_UNIT / parts[-1] > SMALLEST_STEP:
         parts.append(2 * parts[-3])
     steps = [STEP_UNIT / part for part in parts]
+    return [step for step in steps if step < find_largest_step(scheme, resolution, case)]
+
+
+def find_largest_step(scheme: str, resolution: int, case: Case) -> float:
+    """Above this time step an undamped chain with explicit forces is surely unstable (s)."""
     spec = case.spec
     if scheme == "discrete" or spec.damping_time > 0.0:
-        return steps
+        return math.inf
     segment = spec.length / resolution
-    limit = segment**2 * math.sqrt(spec.linear_density / spec.bending_stiffness / 12.0)
-    return [step for step in steps if step < 2.2 * limit]
+    return 2.2 * segment**2 * math.sqrt(spec.linear_density / spec.bending_stiffness / 12.0)

@@ -68,6 +68,7 @@ def test_one_static_case_as_a_document_with_its_files(capsys, tmp_path):
     assert document["command"] == "compare"
     assert document["seed"] == 0
     assert document["settings"] == {
+        "my_hose": None,
         "cases": ["tip-load-1"],
         "models": ["geds"],
         "out": str(out),

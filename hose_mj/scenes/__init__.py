@@ -1,0 +1,1 @@
+"""What a user describes in files: materials and hoses in TOML."""

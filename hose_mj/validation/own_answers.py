@@ -1,0 +1,105 @@
+"""What a user's hose asked for: how fine each model must be, and how far its best run stays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from hose_mj.validation.compare import find_cheapest
+from hose_mj.validation.run import Outcome
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The cheapest setting of a model within a wanted error; Nones where no setting reached it.
+
+    Attributes:
+        at_error: wanted, as a fraction of the length.
+        model: its id.
+        planar: whether GEDS ran in a plane.
+        setting: its label.
+        resolution: control points or segments.
+        timestep: s; None for a rest shape.
+        error: reached, as a fraction of the length.
+        wall_s_per_sim_s: wall time per simulated second; None for a rest shape.
+    """
+
+    at_error: float
+    model: str
+    planar: bool
+    setting: str | None = None
+    resolution: int | None = None
+    timestep: float | None = None
+    error: float | None = None
+    wall_s_per_sim_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """How far the best run of a model stays from the converged hose.
+
+    Attributes:
+        model: its id.
+        clamp_corrected: as in `Setting`.
+        error: largest distance as a fraction of the length.
+        distance: the same in metres.
+        setting: label of the run.
+    """
+
+    model: str
+    clamp_corrected: bool | None
+    error: float
+    distance: float
+    setting: str
+
+
+def list_answers(
+    outcomes: list[Outcome], models: Sequence[str], errors: Sequence[float]
+) -> list[Answer]:
+    """The cheapest setting of each model within each error; GEDS in a plane where it ran there."""
+    kinds = [(model, False) for model in models]
+    if any(outcome.setting.planar for outcome in outcomes):
+        kinds.insert(1, ("geds", True))
+    answers = []
+    for at_error in errors:
+        for model, planar in kinds:
+            best = _find_best(outcomes, model, at_error, planar)
+            answer = Answer(at_error, model, planar)
+            if best is not None:
+                setting = best.setting
+                answer = replace(
+                    answer,
+                    setting=setting.label,
+                    resolution=setting.resolution,
+                    timestep=setting.timestep,
+                    error=best.error,
+                    wall_s_per_sim_s=best.wall_s_per_sim_s,
+                )
+            answers.append(answer)
+    return answers
+
+
+def _find_best(
+    outcomes: list[Outcome], model: str, at_error: float, planar: bool
+) -> Outcome | None:
+    """The cheapest run within an error; of rest shapes, whose cost says little, the coarsest."""
+    if any(outcome.sim_s is not None for outcome in outcomes):
+        return find_cheapest(outcomes, model, at_error, planar=planar)
+    by_size = sorted(outcomes, key=lambda outcome: outcome.setting.resolution)
+    for outcome in by_size:
+        if find_cheapest([outcome], model, at_error, planar=planar) is not None:
+            return outcome
+    return None
+
+
+def list_disagreements(outcomes: list[Outcome], length: float) -> list[Disagreement]:
+    """The run of each model, and of each clamp, that came closest."""
+    best: dict[tuple[str, bool | None], Outcome] = {}
+    for outcome in outcomes:
+        kind = (outcome.setting.model, outcome.setting.clamp_corrected)
+        if kind not in best or outcome.error < best[kind].error:
+            best[kind] = outcome
+    return [
+        Disagreement(model, clamp, run.error, run.error * length, run.setting.label)
+        for (model, clamp), run in best.items()
+    ]

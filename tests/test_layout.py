@@ -18,9 +18,10 @@ FLOORS = {
     "hose_mj": {"hose_mj.errors", "hose_mj.hoses.registry", "hose_mj.hoses.spec"},
     "hose_mj.errors": set(),
     "hose_mj.checks": {"hose_mj.errors"},
+    "hose_mj.compiled": set(),
     "hose_mj.recording": {"hose_mj.errors", "hose_mj.checks"},
     "hose_mj.hoses.spec": {"hose_mj.errors"},
-    "hose_mj.hoses": {"hose_mj.errors", "hose_mj.hoses.spec"},
+    "hose_mj.hoses": {"hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses.spec"},
     "hose_mj.scenes": {"hose_mj.errors", "hose_mj.hoses.spec"},
     "hose_mj.validation": {
         *("hose_mj.errors", "hose_mj.checks", "hose_mj.hoses", "hose_mj.hoses.spec"),
@@ -30,15 +31,17 @@ FLOORS = {
         *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
     },
     "hose_mj.tasks": {
-        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
-        "hose_mj.constraints",
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
+        *("hose_mj.world", "hose_mj.constraints"),
     },
     "hose_mj.envs": {
-        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
-        *("hose_mj.constraints", "hose_mj.tasks"),
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
+        *("hose_mj.world", "hose_mj.constraints", "hose_mj.tasks"),
     },
 }
-PUBLIC = {"hose_mj.envs", "hose_mj.tasks", "hose_mj.recording", "hose_mj.errors"}
+PUBLIC = {
+    *("hose_mj.compiled", "hose_mj.envs", "hose_mj.errors", "hose_mj.recording", "hose_mj.tasks"),
+}
 PACKAGES = ("hose_mj", "learning", "tools")
 HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy"}
 JIT = {"compiled", "jit", "kernel", "njit", "vectorize", "guvectorize"}

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hose_mj.compiled import compile_notice
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, schemes, solver
-from hose_mj.hoses.geds.compiled import compile_notice
 from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
 

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.basis import Tables
-from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
 from hose_mj.hoses.model import Array
 

@@ -25,6 +25,8 @@ _OPTIONS: dict[str, Any] = {
 compiled = numba.njit(**_OPTIONS)
 # _nrt=False (no allocation inside) is left out of numba's types.
 kernel = numba.njit(**_OPTIONS, _nrt=False)  # type: ignore[call-overload]
+# For small functions of a record with many fields, which a call would have to copy one by one.
+inlined = numba.njit(**_OPTIONS, _nrt=False, forceinline=True)  # type: ignore[call-overload]
 
 
 @contextmanager

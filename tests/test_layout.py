@@ -44,7 +44,7 @@ PUBLIC = {
 }
 PACKAGES = ("hose_mj", "learning", "tools")
 HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy"}
-JIT = {"compiled", "jit", "kernel", "njit", "vectorize", "guvectorize"}
+JIT = {"compiled", "inlined", "jit", "kernel", "njit", "vectorize", "guvectorize"}
 
 
 class Import(NamedTuple):

@@ -36,3 +36,11 @@ def check_cell(name: str, cell: object, *ranges: tuple[int, int]) -> None:
     for value, (low, high) in zip(cell, ranges, strict=True):
         if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
             raise InputError(name, cell, valid)
+
+
+def check_cells(name: str, cells: object, number: int, low: int, high: int) -> None:
+    """Raises unless `cells` is a tuple of `number` pairs of integers from `low` to `high`."""
+    if not isinstance(cells, tuple) or len(cells) != number:
+        raise InputError(name, cells, f"a tuple of {number} cells (x, y)")
+    for cell in cells:
+        check_cell(name, cell, (low, high), (low, high))

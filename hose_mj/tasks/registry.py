@@ -35,7 +35,38 @@ class TaskEntry:
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
 
+_LINE = ("hose_mj.tasks.line", "LineSettings", "make_line")
 TASKS: dict[str, TaskEntry] = {
+    "line": TaskEntry(
+        *_LINE,
+        "robots pull a hose of line segments to a common goal (B.2)",
+        {"own_goals": False, "single_agent": False},
+    ),
+    "line-non-cooperative": TaskEntry(
+        *_LINE,
+        "robots pull a hose of line segments, each to a goal of its own (B.2)",
+        {"own_goals": True, "single_agent": False},
+    ),
+    "line-single-agent": TaskEntry(
+        *_LINE,
+        "one agent moves all robots of the hose, one at a time (chapter 5)",
+        {"own_goals": False, "single_agent": True},
+    ),
+    "line-2015": TaskEntry(
+        *_LINE,
+        "the author's experiment of 2015: four robots, fixed start and goal",
+        {"own_goals": False, "single_agent": False},
+        {
+            "half_width": 9,
+            "start": ((2, 5), (2, 3), (3, 1), (1, 2)),
+            "goal": (-2, -2),
+            "collision": "robots",
+            "move_rule": "cancelling",
+            "goal_reward": 10.0,
+            "violation_reward": -1.0,
+            "step_limit": 1600,
+        },
+    ),
     "corridor": TaskEntry(
         "hose_mj.tasks.tiny",
         "CorridorSettings",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined
 
 Stream = npt.NDArray[np.uint64]
 
@@ -19,7 +19,7 @@ def make_stream(generator: np.random.Generator) -> Stream:
     return generator.integers(0, 2**64, size=1, dtype=np.uint64)
 
 
-@kernel
+@inlined
 def draw_bits(stream):  # type: ignore[no-untyped-def]
     """Draws 64 random bits (uint64)."""
     stream[0] += np.uint64(0x9E3779B97F4A7C15)
@@ -29,7 +29,7 @@ def draw_bits(stream):  # type: ignore[no-untyped-def]
     return bits ^ (bits >> np.uint64(31))
 
 
-@kernel
+@inlined
 def draw_below(stream, count):  # type: ignore[no-untyped-def]
     """Draws an integer uniformly from 0 .. count - 1, for a count of 1 to 2^31."""
     bound = np.uint64(count)
@@ -44,7 +44,7 @@ def draw_below(stream, count):  # type: ignore[no-untyped-def]
     return np.int64(product >> np.uint64(32))
 
 
-@kernel
+@inlined
 def draw_unit(stream):  # type: ignore[no-untyped-def]
     """Draws a float uniformly from the multiples of 2^-53 in [0, 1)."""
     return np.float64(draw_bits(stream) >> np.uint64(11)) * 2.0**-53

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import HEADER, TURN, Floats, Integers, begin, end_joint, end_turn
 from hose_mj.tasks.stream import draw_below
@@ -40,7 +40,7 @@ class Corridor(NamedTuple):
 
 
 @kernels.reset.register(Corridor)
-@kernel
+@inlined
 def reset_corridor(record, state, stream):  # type: ignore[no-untyped-def]
     """Puts the robots on their first cells."""
     begin(state)
@@ -49,13 +49,13 @@ def reset_corridor(record, state, stream):  # type: ignore[no-untyped-def]
 
 
 @joint.find_target.register(Corridor)
-@kernel
+@inlined
 def find_corridor_target(record, state, robot, action):  # type: ignore[no-untyped-def]
     """Returns the cell an action leads to; -1 and n_cells are walls."""
     return state[HEADER + robot] + (action == RIGHT) - (action == LEFT)
 
 
-@kernel
+@inlined
 def is_goal_held(record, state):  # type: ignore[no-untyped-def]
     """Whether a robot stands on the goal."""
     held = False
@@ -65,7 +65,7 @@ def is_goal_held(record, state):  # type: ignore[no-untyped-def]
 
 
 @kernels.apply.register(Corridor)
-@kernel
+@inlined
 def apply_corridor(record, state, agent, action):  # type: ignore[no-untyped-def]
     """Moves one robot; a wall or the other robot stops it."""
     here = state[HEADER + agent]
@@ -85,7 +85,7 @@ def apply_corridor(record, state, agent, action):  # type: ignore[no-untyped-def
 
 
 @kernels.apply_joint.register(Corridor)
-@kernel
+@inlined
 def apply_joint_corridor(record, state, actions, charged):  # type: ignore[no-untyped-def]
     """Moves both robots at once; a wall, or the other robot, stops one."""
     packed = joint.pack(actions)
@@ -110,7 +110,7 @@ def apply_joint_corridor(record, state, actions, charged):  # type: ignore[no-un
 
 
 @kernels.observe.register(Corridor)
-@kernel
+@inlined
 def observe_corridor(record, state, agent, values):  # type: ignore[no-untyped-def]
     """Writes the robots' cells, which both agents see."""
     for robot in range(record.n_agents):
@@ -146,7 +146,7 @@ class Maze(NamedTuple):
 
 
 @kernels.reset.register(Maze)
-@kernel
+@inlined
 def reset_maze(record, state, stream):  # type: ignore[no-untyped-def]
     """Puts the robot on its first cell, or on any but the goal's."""
     begin(state)
@@ -161,7 +161,7 @@ def reset_maze(record, state, stream):  # type: ignore[no-untyped-def]
 
 
 @kernels.apply.register(Maze)
-@kernel
+@inlined
 def apply_maze(record, state, agent, action):  # type: ignore[no-untyped-def]
     """Moves the robot up, down, left or right; a wall stops it."""
     end_turn(record, state, agent)
@@ -175,7 +175,7 @@ def apply_maze(record, state, agent, action):  # type: ignore[no-untyped-def]
 
 
 @kernels.apply_joint.register(Maze)
-@kernel
+@inlined
 def apply_joint_maze(record, state, actions, charged):  # type: ignore[no-untyped-def]
     """Moves the robot; there is only one."""
     charged[0] = apply_maze(record, state, 0, actions[0])
@@ -183,7 +183,7 @@ def apply_joint_maze(record, state, actions, charged):  # type: ignore[no-untype
 
 
 @kernels.observe.register(Maze)
-@kernel
+@inlined
 def observe_maze(record, state, agent, values):  # type: ignore[no-untyped-def]
     """Writes x, y and for each action whether a wall is in its way."""
     values[0], values[1] = state[HEADER], state[HEADER + 1]

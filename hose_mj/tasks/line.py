@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -98,7 +98,8 @@ class LineSettings:
             check_cells("goal", self.goal, self.n_robots, -h, h)
         else:
             check_cell("goal", self.goal, (-h, h), (-h, h))
-            if sum(x * x for x in self.goal) > self.hose_length**2:  # type: ignore[operator]
+            x, y = cast(Cell, self.goal)
+            if x * x + y * y > self.hose_length**2:
                 valid = f"a cell within the hose's length {self.hose_length} of the source"
                 raise InputError("goal", self.goal, valid)
 

@@ -36,6 +36,7 @@ class TaskEntry:
 
 
 _LINE = ("hose_mj.tasks.line", "LineSettings", "make_line")
+_TAXI = ("hose_mj.tasks.taxi", "TaxiSettings", "make_taxi")
 TASKS: dict[str, TaskEntry] = {
     "line": TaskEntry(
         *_LINE,
@@ -66,6 +67,16 @@ TASKS: dict[str, TaskEntry] = {
             "violation_reward": -1.0,
             "step_limit": 1600,
         },
+    ),
+    "taxi": TaskEntry(
+        *_TAXI,
+        "two taxis and two passengers on Dietterich's map (B.3)",
+        {"single_agent": False},
+    ),
+    "taxi-single-agent": TaskEntry(
+        *_TAXI,
+        "one agent chooses for both taxis at once (section 5.5.2)",
+        {"single_agent": True},
     ),
     "corridor": TaskEntry(
         "hose_mj.tasks.tiny",

@@ -171,7 +171,8 @@ def compute_safe_mask(record, state, agent, scratch):  # type: ignore[no-untyped
     safe = 0
     for action in range(record.n_actions):
         if available >> action & 1:
-            scratch[:] = state
+            for k in range(state.shape[0]):
+                scratch[k] = state[k]
             if apply(record, scratch, agent, action) & record.violations == 0:
                 safe |= 1 << action
     return safe

@@ -73,15 +73,20 @@ def is_walled(record, state, taxi, action):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def is_held(record, state, taxi, cell):  # type: ignore[no-untyped-def]
+    """Whether another taxi stands on the cell."""
+    held = False
+    for other in range(record.n_taxis):
+        held = held or (other != taxi and state[HEADER + other] == cell)
+    return held
+
+
+@inlined
 def is_blocked(record, state, taxi, action):  # type: ignore[no-untyped-def]
     """Whether a wall or another taxi is in the way of an action."""
-    if is_walled(record, state, taxi, action):
-        return True
-    target = find_taxi_target(record, state, taxi, action)
-    for other in range(record.n_taxis):
-        if other != taxi and state[HEADER + other] == target:
-            return True
-    return False
+    return is_walled(record, state, taxi, action) or is_held(
+        record, state, taxi, find_taxi_target(record, state, taxi, action)
+    )
 
 
 @inlined

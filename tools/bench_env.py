@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.envs.gym import TaskEnv
 from hose_mj.envs.vector import VectorTaskEnv
 from hose_mj.tasks import kernels
 from hose_mj.tasks.registry import make_task
@@ -20,7 +20,7 @@ N_ROBOTS = (2, 3, 4, 6, 8)
 MAIN = 4
 """The number of robots that the limits are about."""
 COPIES = 1024
-PEER = "Gymnasium's Taxi, stepped from Python"
+PEER = "Gymnasium's Taxi from Python"
 LEAST_MOVES, LEAST_RATIO, LEAST_VECTOR_MOVES = 3e6, 100.0, 1e6
 """Limits: moves/s of the line task, times faster than the peer, moves/s a core of the copies."""
 
@@ -39,25 +39,26 @@ def measure(quick: bool, seed: int) -> Bench:
         named = None if peer is None else PEER
         bench.records.append(Record("env", name, value, "moves/s", named, ratio))
 
-    taxi = rate(step_gymnasium("Taxi", seed))
+    taxi = rate(step_gymnasium("Taxi-v4", 1, seed))
     record(PEER, taxi)
     for n_robots in (MAIN,) if quick else N_ROBOTS:
         moves = rate(play_compiled(n_robots, seed))
-        record(f"line, {n_robots} robots, all variables observed, one core", moves, taxi)
+        record(f"line, N = {n_robots}, compiled loop", moves, taxi)
         if n_robots == MAIN:
             bench.checks += [
-                Check(f"line, {MAIN} robots: moves/s", moves, LEAST_MOVES, ">="),
-                Check(f"line, {MAIN} robots: times {PEER}", moves / taxi, LEAST_RATIO, ">="),
+                Check(f"line, N = {MAIN}: moves/s", moves, LEAST_MOVES, ">="),
+                Check(f"line, N = {MAIN}: times {PEER}", moves / taxi, LEAST_RATIO, ">="),
             ]
     one_core = rate(step_copies(1, seed))
-    record(f"make_vec, line, {MAIN} robots, {COPIES} copies, one core", one_core, taxi)
-    name = f"make_vec, {COPIES} copies: moves/s on one core"
+    record(f"line, N = {MAIN}, {COPIES} copies, one core", one_core, taxi)
+    name = f"line, N = {MAIN}, {COPIES} copies: moves/s on one core"
     bench.checks.append(Check(name, one_core, LEAST_VECTOR_MOVES, ">="))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     if cores and cores > 1:
         all_cores = rate(step_copies(None, seed))
-        record(f"make_vec, line, {MAIN} robots, {COPIES} copies, all cores", all_cores, taxi)
-    record(f"Gymnasium interface, line, {MAIN} robots", rate(step_single(seed)), taxi)
+        record(f"line, N = {MAIN}, {COPIES} copies, all cores", all_cores, taxi)
+    single = rate(step_gymnasium("hose_mj/Line-v0", MAIN, seed, n_robots=MAIN))
+    record(f"line, N = {MAIN}, one copy from Python", single, taxi)
     return bench
 
 
@@ -96,27 +97,18 @@ def step_copies(cores: int | None, seed: int) -> Callable[[], int]:
     return work
 
 
-def step_single(seed: int) -> Callable[[], int]:
-    """Random joint moves of one copy, stepped from Python."""
-    return _step(TaskEnv("line", n_robots=MAIN), MAIN, seed)
-
-
-def step_gymnasium(name: str, seed: int) -> Callable[[], int]:
-    """Random moves in an environment of Gymnasium's, without wrappers."""
-    versions = [id for id in gymnasium.registry if id.startswith(f"{name}-v")]
-    return _step(gymnasium.make(max(versions)).unwrapped, 1, seed)
-
-
-def _step(env: gymnasium.Env[object, object], moves: int, seed: int) -> Callable[[], int]:
+def step_gymnasium(id: str, moves: int, seed: int, **options: Any) -> Callable[[], int]:
+    """Random steps of an environment as `gymnasium.make` makes it, each of so many moves."""
+    env = gymnasium.make(id, **options)
     env.action_space.seed(seed)
-    actions = [env.action_space.sample() for _ in range(1000)]
     env.reset(seed=seed)
+    steps = 1000
 
     def work() -> int:
-        for action in actions:
-            _, _, terminated, truncated, _ = env.step(action)
+        for _ in range(steps):
+            _, _, terminated, truncated, _ = env.step(env.action_space.sample())
             if terminated or truncated:
                 env.reset()
-        return len(actions) * moves
+        return steps * moves
 
     return work

@@ -1,4 +1,4 @@
-"""`Renderer`: shows an episode in one of the render modes; loads what it needs at the first frame."""
+"""`Renderer`: shows an episode in a render mode; loads what it needs at the first frame."""
 
 from __future__ import annotations
 

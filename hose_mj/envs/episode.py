@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
+from hose_mj.compiled import compile_notice
 from hose_mj.envs import kernels
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
@@ -47,7 +49,7 @@ class Episode:
         self.chosen = choose_signals(task, rewards)
         self._stream: Stream | None = None
         self._generator: np.random.Generator | None = None
-        self._begun = False
+        self._begun = self._compiled = False
 
     @property
     def turn(self) -> int:
@@ -82,8 +84,7 @@ class Episode:
         self._check_running()
         number = self.check_action(action, self.turn)
         kernels.forget(self.charged, self.felt)
-        record = self.task.kernel
-        self._end(kernels.play_turn(record, self.state, number, self.charged, self.felt))
+        self._play(kernels.play_turn, number)
 
     def play_all(self, actions: Sequence[Any], at_once: bool) -> None:
         """Lets all agents move, at once or each in its turn until the episode ends.
@@ -93,10 +94,11 @@ class Episode:
         """
         self._check_running()
         if len(actions) != self.task.n_agents:
-            raise InputError("actions", actions, f"{self.task.n_agents} actions, one for each agent")
+            raise InputError(
+                "actions", actions, f"{self.task.n_agents} actions, one for each agent"
+            )
         numbers = np.array([self.check_action(a, i) for i, a in enumerate(actions)], np.int64)
-        play = kernels.play_joint if at_once else kernels.play_round
-        self._end(play(self.task.kernel, self.state, numbers, self.charged, self.felt))
+        self._play(kernels.play_joint if at_once else kernels.play_round, numbers)
 
     def check_action(self, action: Any, agent: int) -> int:
         """Returns an action as a plain integer; `InputError` unless it is in range."""
@@ -128,7 +130,10 @@ class Episode:
             found = "over" if self._begun else "not begun"
             raise InputError("episode", found, "one that runs; call reset() first")
 
-    def _end(self, events: int) -> None:
+    def _play(self, play: Callable[..., Any], actions: int | Integers) -> None:
+        with nullcontext() if self._compiled else compile_notice(f"task {self.task.id}"):
+            events = play(self.task.kernel, self.state, actions, self.charged, self.felt)
+        self._compiled = True
         self.events = int(events)
         self.terminated = bool(self.events & self.task.kernel.terminal)
         self.truncated = not self.terminated and self.steps >= self.task.step_limit
@@ -140,7 +145,8 @@ def compute_team_signals(felt: Floats) -> Floats:
     So an event that all agents feel counts once, as in Table 6.1. `felt` is
     (..., movers, agents, n_signals).
     """
-    return np.einsum("...mms->...s", felt)
+    own: Floats = np.einsum("...mms->...s", felt)
+    return own
 
 
 def sum_signals(signals: Floats, chosen: Integers) -> Floats:

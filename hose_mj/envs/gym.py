@@ -1,4 +1,4 @@
-"""`TaskEnv`: a task as a Gymnasium environment: one actor chooses for all agents, or for the only one."""
+"""`TaskEnv`: a task as a Gymnasium environment, where one actor chooses for all agents."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     (MultiDiscrete). The observation has each variable that all agents share once, then those of
     each agent. The reward is the team's: what each agent gets for its own events, summed.
 
-    `info` holds `action_mask` (int8, one row for each agent if there are several), `events` (names),
-    `signals` (the team's reward by signal) and `agent_rewards` (what each agent gets by itself).
+    `info` holds `action_mask` (int8, one row for each agent if there are several), `events`
+    (names), `signals` (the team's reward by signal) and `agent_rewards` (what each agent gets).
 
     Args:
         task: id of a task, or a task.

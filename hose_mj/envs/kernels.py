@@ -1,7 +1,6 @@
-"""What the interfaces add to a task's rules, compiled: who moves when, who feels what, who sees what.
+"""What the interfaces add to a task's rules, compiled: who moves when, feels what, sees what.
 
-One move or one round of moves fills an `Outcome`; `play_all` does it for many copies at once. The
-first argument of each function is the task's kernel record, as in `hose_mj.tasks.kernels`.
+The first argument of each function is the task's kernel record, as in `hose_mj.tasks.kernels`.
 """
 
 from __future__ import annotations
@@ -36,12 +35,10 @@ class Sight(NamedTuple):
     Attributes:
         agents: the agent that sees each entry, rising (n_seen,).
         columns: its place among the task's variables (n_seen,).
-        n_variables: number of the task's variables.
     """
 
     agents: Integers
     columns: Integers
-    n_variables: int
 
 
 class Batch(NamedTuple):
@@ -77,7 +74,7 @@ class Batch(NamedTuple):
 
 @kernel
 def forget(charged, felt):  # type: ignore[no-untyped-def]
-    """Clears what the last step left: events (n_agents,), rewards (n_agents, n_agents, n_signals)."""
+    """Clears what the last step left: the agents' events, and who felt what; see `Batch`."""
     charged[:] = 0
     felt[:] = 0.0
 

@@ -39,4 +39,6 @@ def build_task(task: str | Task, options: dict[str, Any], max_cycles: int | None
 def refuse_reset_options(options: dict[str, Any] | None) -> None:
     """Raises `InputError` for options of a reset: there are none."""
     if options:
-        raise InputError("options of reset", sorted(options), "none; a task's options are made with it")
+        raise InputError(
+            "options of reset", sorted(options), "none; a task's options are made with it"
+        )

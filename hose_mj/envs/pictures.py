@@ -1,4 +1,4 @@
-"""What each task looks like: a function from its state to a `Picture`, chosen by its record's type."""
+"""What each task looks like: functions from a state to a `Picture`, chosen by the task's record."""
 
 from __future__ import annotations
 
@@ -76,7 +76,9 @@ def draw_maze(record: Maze, task: Task, state: Integers, caption: str) -> Pictur
     at = state[task.layout["robots"]]
     goal = Mark(GOAL, (record.goal_x, record.goal_y), "", GOAL_COLOR)
     cells = [(x, y) for x in range(record.width) for y in range(record.height)]
-    sides = [(x, y, s) for x, y in cells for k, s in enumerate(_STEPS.values()) if record.walls[x, y, k]]
+    sides = [
+        (x, y, s) for x, y in cells for k, s in enumerate(_STEPS.values()) if record.walls[x, y, k]
+    ]
     return Picture(
         (0, 0),
         record.width,
@@ -121,7 +123,9 @@ def draw_line(record: Line, task: Task, state: Integers, caption: str) -> Pictur
 @draw.register
 def draw_taxi(record: Taxi, task: Task, state: Integers, caption: str) -> Picture:
     """Dietterich's map; a passenger has the colour of the station that he wants to go to."""
-    stations = {_find_taxi_cell(WIDTH * row + column): name for name, (row, column) in STATIONS.items()}
+    stations = {
+        _find_taxi_cell(WIDTH * row + column): name for name, (row, column) in STATIONS.items()
+    }
     marks = [Mark(STATION, at, name, STATION_COLORS[name]) for at, name in stations.items()]
     taxis = [_find_taxi_cell(cell) for cell in state[task.layout["taxis"]]]
     for number, at in enumerate(taxis):

@@ -37,7 +37,7 @@ class Raster:
 
     def __init__(self, picture: Picture, cell: int) -> None:
         self.cell = _FINE * cell
-        self.margin = self.cell // 2 if picture.walls else _FINE * 6
+        self.margin = max(_FINE * 6, self.cell // 8) if picture.walls else _FINE * 6
         self.caption_height = _FINE * 30
         self.picture = picture
         width = picture.columns * self.cell + 2 * self.margin
@@ -118,9 +118,11 @@ def _draw_floor(raster: Raster) -> None:
 
 
 def _draw_walls(raster: Raster) -> None:
-    width = max(_FINE * 2, raster.cell // 12)
+    half = max(_FINE, raster.cell // 24)
     for start, end in raster.picture.walls:
-        raster.pen.line((*raster.place(start), *raster.place(end)), fill=_INK, width=width)
+        (x0, y0), (x1, y1) = sorted((raster.place(start), raster.place(end)))
+        box = (x0 - half, min(y0, y1) - half, x1 + half, max(y0, y1) + half)
+        raster.pen.rectangle(box, fill=_INK)
 
 
 def _draw_hose(raster: Raster) -> None:
@@ -135,9 +137,10 @@ def _draw_flag(raster: Raster, side: Point, centre: Point) -> None:
     """A bar along the side of a cell, a little inside it."""
     across = (side[0] - centre[0], side[1] - centre[1])
     along = (0.6 * across[1], 0.6 * across[0])
-    inside = (centre[0] + 0.94 * across[0], centre[1] + 0.94 * across[1])
+    inset = 0.87 if raster.picture.walls else 0.94  # a wall is thick
+    inside = (centre[0] + inset * across[0], centre[1] + inset * across[1])
     ends = [raster.place((inside[0] + s * along[0], inside[1] + s * along[1])) for s in (-1, 1)]
-    raster.pen.line([*ends[0], *ends[1]], fill=_FLAG, width=max(_FINE * 2, raster.cell // 9))
+    raster.pen.line([*ends[0], *ends[1]], fill=_FLAG, width=max(_FINE * 2, raster.cell // 11))
 
 
 def _draw_mark(raster: Raster, mark: Mark) -> None:
@@ -147,9 +150,9 @@ def _draw_mark(raster: Raster, mark: Mark) -> None:
         raster.write((mark.at[0] - 0.28, mark.at[1] + 0.25), mark.label, 0.3, mark.color)
     elif mark.kind == GOAL:
         pen.rectangle(raster.box(mark.at, 0.46), fill=_pale(mark.color))
-        for half in (0.34, 0.18):
+        for half in (0.44,) if mark.label else (0.34, 0.16):
             pen.ellipse(raster.box(mark.at, half), outline=mark.color, width=2 * thin)
-        raster.write(mark.at, mark.label, 0.5, _INK)
+        raster.write(mark.at, mark.label, 0.5, mark.color)
     elif mark.kind == SOURCE:
         pen.rectangle(raster.box(mark.at, 0.36), fill=_INK)
         raster.write(mark.at, mark.label, 0.5, _PAPER)
@@ -161,8 +164,8 @@ def _draw_mark(raster: Raster, mark: Mark) -> None:
         pen.rounded_rectangle(box, 0.12 * raster.cell, fill=mark.color, outline=_INK, width=thin)
         raster.write((mark.at[0], mark.at[1] + 0.14), mark.label, 0.3, _PAPER)
     elif mark.kind == ROBOT:
-        pen.ellipse(raster.box(mark.at, 0.40), fill=mark.color, outline=_PAPER, width=2 * thin)
-        raster.write(mark.at, mark.label, 0.5, _PAPER)
+        pen.ellipse(raster.box(mark.at, 0.40), fill=mark.color, outline=_PAPER, width=thin)
+        raster.write(mark.at, mark.label, 0.56, _PAPER)
 
 
 def _pale(color: Rgb) -> Rgb:

@@ -13,7 +13,8 @@ def write_picture(picture: Picture) -> str:
     """Returns the picture as lines of text, the caption last.
 
     A robot is its number, the goal G, the source S, the hose ``*``, an empty cell a dot; walls are
-    bars and dashes. Marks that share a cell show the last one of them, a passenger behind what carries it.
+    bars and dashes. Of marks that share a cell the last one shows, a passenger behind what carries
+    him.
     """
     cells: dict[tuple[int, int], str] = {}
     for start, end in zip(picture.hose, picture.hose[1:], strict=False):

@@ -136,9 +136,9 @@ class TurnsEnv(AECEnv[str, Any, Any]):
 
     def _write_infos(self) -> None:
         masks = self.episode.make_masks()
+        self.infos: dict[str, dict[str, Any]] = {}
         for number, agent in enumerate(self.agents):
             cycle = self._cycles[number]
-            self.infos = {} if number == 0 else self.infos
             self.infos[agent] = {
                 "action_mask": masks[number].copy(),
                 "events": self.task.name_events(cycle.events),

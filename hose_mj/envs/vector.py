@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numba
@@ -12,6 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from hose_mj.compiled import compile_notice
 from hose_mj.envs import kernels
 from hose_mj.envs.episode import check_moves, choose_signals, compute_team_signals, sum_signals
 from hose_mj.envs.gym import make_action_space
@@ -94,7 +96,7 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
         """What each entry of an observation is called."""
         return self._view.names
 
-    def reset(  # type: ignore[override]
+    def reset(
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
@@ -112,9 +114,10 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
         """
         refuse_reset_options(options)
         self._seed(seed)
-        self._begun = True
         self._batch.over[:] = 1
-        self._play(np.zeros((self.num_envs, self.task.n_agents), np.int64))
+        with nullcontext() if self._begun else compile_notice(f"copies of task {self.task.id}"):
+            self._play(np.zeros((self.num_envs, self.task.n_agents), np.int64))
+        self._begun = True
         return self._observe(), self._make_infos()
 
     def step(self, actions: Any) -> Result:
@@ -218,7 +221,7 @@ def make_batch(task: Task, n: int, n_seen: int) -> kernels.Batch:
 
 def check_cores(cores: int | None) -> int:
     """Returns how many cores to use; `InputError` unless there are as many."""
-    there = numba.config.NUMBA_NUM_THREADS
+    there = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
     if cores is None:
         return int(there)
     if isinstance(cores, bool) or not isinstance(cores, int) or not 1 <= cores <= there:

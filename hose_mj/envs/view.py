@@ -43,24 +43,17 @@ class View:
     def __init__(
         self, task: Task, observe: Sequence[str] | None, form: Form, agents: Sequence[int]
     ) -> None:
-        chosen = choose_variables(task, observe)
-        places = [task.variables.index(variable) for variable in chosen]
-        entries = [(agents[0], place) for place in places if not task.variables[place].per_agent]
-        for agent in agents:
-            entries += [(agent, place) for place in places if task.variables[place].per_agent]
-        variables = [task.variables[place] for _, place in entries]
-        if len(agents) == 1:
-            entries = [(agents[0], place) for place in places]
-            variables = list(chosen)
+        entries = list_entries(choose_variables(task, observe), agents)
         self.names = tuple(
             f"{task.agents[agent]}.{variable.name}"
             if variable.per_agent and len(agents) > 1
             else variable.name
-            for (agent, _), variable in zip(entries, variables, strict=True)
+            for agent, variable in entries
         )
-        self.cardinalities = np.array([variable.cardinality for variable in variables], np.int64)
-        seers, columns = np.array(entries, np.int64).T
-        self.sight = kernels.Sight(seers.copy(), columns.copy(), len(task.variables))
+        self.cardinalities = np.array([variable.cardinality for _, variable in entries], np.int64)
+        seers = np.array([agent for agent, _ in entries], np.int64)
+        columns = np.array([task.variables.index(variable) for _, variable in entries], np.int64)
+        self.sight = kernels.Sight(seers, columns)
         self._values = np.zeros(len(task.variables), np.int64)
         self.form = check_form(form)
         self._strides = np.ones(len(entries), np.int64)
@@ -80,7 +73,8 @@ class View:
         if self.form == "index":
             return spaces.Discrete(int(np.prod(self.cardinalities)))
         pairs = zip(self.names, self.cardinalities, strict=True)
-        return spaces.Dict({name: spaces.Discrete(int(count)) for name, count in pairs})
+        # A mapping would be sorted by name, a sequence of pairs keeps its order.
+        return spaces.Dict([(name, spaces.Discrete(int(count))) for name, count in pairs])
 
     def make_box(self) -> spaces.Box:
         """Makes the bounds of an array as a Box, which PettingZoo's tests want."""
@@ -101,6 +95,15 @@ class View:
             raise InputError("observe", observe, f"fewer variables: {size:.1e} states exceed 2^62")
         behind = np.append(self.cardinalities[1:], 1)
         return np.cumprod(behind[::-1])[::-1].copy()
+
+
+def list_entries(chosen: Sequence[Variable], agents: Sequence[int]) -> list[tuple[int, Variable]]:
+    """Lists who sees what: for several agents what they share first, seen by the first of them."""
+    if len(agents) == 1:
+        return [(agents[0], variable) for variable in chosen]
+    shared = [(agents[0], variable) for variable in chosen if not variable.per_agent]
+    own = [variable for variable in chosen if variable.per_agent]
+    return shared + [(agent, variable) for agent in agents for variable in own]
 
 
 def choose_variables(task: Task, observe: Sequence[str] | None) -> tuple[Variable, ...]:

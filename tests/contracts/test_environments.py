@@ -49,7 +49,7 @@ def make_small(id, form, **options):
     """An environment; an index takes few enough variables to fit in an integer."""
     env = gymnasium.make(id, **options)
     if form != "array":
-        names = [variable.name for variable in env.unwrapped.task.variables][:2]
+        names = [variable.name for variable in env.unwrapped.task.variables][-2:]
         env = gymnasium.make(id, form=form, observe=names, **options)
     return env
 

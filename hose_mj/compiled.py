@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numba
+from numba.extending import register_jitable
 
 _OPTIONS: dict[str, Any] = {
     "cache": True,
@@ -27,6 +28,8 @@ compiled = numba.njit(**_OPTIONS)
 kernel = numba.njit(**_OPTIONS, _nrt=False)  # type: ignore[call-overload]
 # For small functions of a record with many fields, which a call would have to copy one by one.
 inlined = numba.njit(**_OPTIONS, _nrt=False, forceinline=True)  # type: ignore[call-overload]
+# Compiled into compiled callers; for others it stays plain Python, whatever its arguments are.
+jitable: Any = register_jitable(forceinline=True, error_model="numpy")
 
 
 @contextmanager

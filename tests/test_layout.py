@@ -44,7 +44,7 @@ PUBLIC = {
 }
 PACKAGES = ("hose_mj", "learning", "tools")
 HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy"}
-JIT = {"compiled", "inlined", "jit", "kernel", "njit", "vectorize", "guvectorize"}
+JIT = {"compiled", "inlined", "jit", "jitable", "kernel", "njit", "vectorize", "guvectorize"}
 
 
 class Import(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hose_mj.compiled import inlined
+from hose_mj.compiled import jitable
 from hose_mj.tasks.kernels import Integers, dispatched
 
 CANCELLED = 7
@@ -22,7 +22,7 @@ def find_target(record: Any, state: Integers, robot: int, action: int) -> int:
     raise NotImplementedError(type(record).__name__)
 
 
-@inlined
+@jitable
 def pack(actions):  # type: ignore[no-untyped-def]
     """Packs the actions (n,), each below 7."""
     packed = 0
@@ -31,19 +31,19 @@ def pack(actions):  # type: ignore[no-untyped-def]
     return packed
 
 
-@inlined
+@jitable
 def unpack(packed, robot):  # type: ignore[no-untyped-def]
     """Returns a robot's action."""
     return packed >> 3 * robot & 7
 
 
-@inlined
+@jitable
 def cancel(packed, robot):  # type: ignore[no-untyped-def]
     """Returns the packed actions with the robot's cancelled."""
     return packed | CANCELLED << 3 * robot
 
 
-@inlined
+@jitable
 def settle(record, state, n_robots, packed, winner):  # type: ignore[no-untyped-def]
     """Cancels moves until all that are left can be made at once, and returns the packed actions.
 
@@ -60,7 +60,7 @@ def settle(record, state, n_robots, packed, winner):  # type: ignore[no-untyped-
     return packed
 
 
-@inlined
+@jitable
 def settle_pair(record, state, packed, one, other, winner):  # type: ignore[no-untyped-def]
     """Cancels what two robots cannot do at once and returns the packed actions."""
     from_one = find_target(record, state, one, CANCELLED)

@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 from numba.extending import overload
 
-from hose_mj.compiled import compiled, inlined
+from hose_mj.compiled import compiled, jitable
 from hose_mj.tasks.stream import draw_below
 
 TURN, STEPS = 0, 1
@@ -96,46 +96,46 @@ def observe(record: Any, state: Integers, agent: int, values: Integers) -> None:
 
 
 @dispatched
-@inlined
+@jitable
 def mask(record, state, agent):  # type: ignore[no-untyped-def]
     """Returns the available actions as bits; all of them, unless the task says otherwise."""
     return (1 << record.n_actions) - 1
 
 
-@inlined
+@jitable
 def begin(state):  # type: ignore[no-untyped-def]
     """Sets turn and step count of an initial state."""
     state[TURN] = 0
     state[STEPS] = 0
 
 
-@inlined
+@jitable
 def end_turn(record, state, agent):  # type: ignore[no-untyped-def]
     """Hands the turn to the next agent and counts the move."""
     state[TURN] = agent + 1 if agent + 1 < record.n_agents else 0
     state[STEPS] += 1
 
 
-@inlined
+@jitable
 def end_joint(record, state):  # type: ignore[no-untyped-def]
     """Hands the turn to agent 0 and counts a move of every agent."""
     state[TURN] = 0
     state[STEPS] += record.n_agents
 
 
-@inlined
+@jitable
 def is_over(record, events):  # type: ignore[no-untyped-def]
     """Whether the events end the episode."""
     return events & record.terminal != 0
 
 
-@inlined
+@jitable
 def is_cut_off(record, state):  # type: ignore[no-untyped-def]
     """Whether the step limit is reached."""
     return state[STEPS] >= record.step_limit
 
 
-@inlined
+@jitable
 def add_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyped-def]
     """Adds what the agent gets for the events of a move of `mover`, by signal (n_signals,)."""
     felt = events if agent == mover else events & record.shared
@@ -143,14 +143,14 @@ def add_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyp
         rewards[signal] += record.reward_table[felt, signal]
 
 
-@inlined
+@jitable
 def compute_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyped-def]
     """Writes what the agent gets for the events of a move of `mover`, by signal (n_signals,)."""
     rewards[:] = 0.0
     add_rewards(record, events, mover, agent, rewards)
 
 
-@inlined
+@jitable
 def compute_joint_rewards(record, charged, agent, rewards):  # type: ignore[no-untyped-def]
     """Writes what the agent gets for a joint move, by signal (n_signals,).
 
@@ -161,7 +161,7 @@ def compute_joint_rewards(record, charged, agent, rewards):  # type: ignore[no-u
         add_rewards(record, charged[mover], mover, agent, rewards)
 
 
-@inlined
+@jitable
 def compute_safe_mask(record, state, agent, scratch):  # type: ignore[no-untyped-def]
     """Returns, as bits, the available actions that break no constraint at once.
 
@@ -192,7 +192,7 @@ class Projection(NamedTuple):
     size: int
 
 
-@inlined
+@jitable
 def project(projection, values):  # type: ignore[no-untyped-def]
     """Returns the index of the values (n_variables,) that `observe` wrote."""
     index = 0

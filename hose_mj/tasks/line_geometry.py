@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hose_mj.compiled import inlined
+from hose_mj.compiled import jitable
 from hose_mj.tasks.kernels import Integers
 
 N_DIRECTIONS = 8
@@ -14,7 +14,7 @@ MARGIN = 2
 """How much farther than its limit one joint move can stretch a segment, in cells along an axis."""
 
 
-@inlined
+@jitable
 def covers(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
     """Whether the segment from a to b meets the open unit square centred on the cell (x, y).
 

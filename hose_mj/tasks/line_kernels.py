@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hose_mj.compiled import inlined
+from hose_mj.compiled import inlined, jitable
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import HEADER, Floats, Integers, begin, end_joint, end_turn
 from hose_mj.tasks.line_geometry import covers
@@ -69,44 +69,44 @@ class Line(NamedTuple):
     direction_table: Integers
 
 
-@inlined
+@jitable
 def get_x(state, point):  # type: ignore[no-untyped-def]
     """Returns x of a robot or the source."""
     return state[HEADER + 2 * point]
 
 
-@inlined
+@jitable
 def get_y(state, point):  # type: ignore[no-untyped-def]
     """Returns y of a robot or the source."""
     return state[HEADER + 2 * point + 1]
 
 
-@inlined
+@jitable
 def put(state, point, x, y):  # type: ignore[no-untyped-def]
     """Puts a robot, or with point = N + 1 + k goal k, on a cell."""
     state[HEADER + 2 * point] = x
     state[HEADER + 2 * point + 1] = y
 
 
-@inlined
+@jitable
 def step_x(action):  # type: ignore[no-untyped-def]
     """Returns by how much an action raises x."""
     return (action == RIGHT) - (action == LEFT)
 
 
-@inlined
+@jitable
 def step_y(action):  # type: ignore[no-untyped-def]
     """Returns by how much an action raises y."""
     return (action == UP) - (action == DOWN)
 
 
-@inlined
+@jitable
 def is_inside(record, x, y):  # type: ignore[no-untyped-def]
     """Whether a cell is on the grid."""
     return abs(x) <= record.half_width and abs(y) <= record.half_width
 
 
-@inlined
+@jitable
 def is_held(record, state, robot, x, y):  # type: ignore[no-untyped-def]
     """Whether another robot stands on the cell."""
     for other in range(record.n_robots):
@@ -115,14 +115,14 @@ def is_held(record, state, robot, x, y):  # type: ignore[no-untyped-def]
     return False
 
 
-@inlined
+@jitable
 def is_covered(state, segment, x, y):  # type: ignore[no-untyped-def]
     """Whether the segment covers the cell."""
     ax, ay = get_x(state, segment), get_y(state, segment)
     return covers(ax, ay, get_x(state, segment + 1), get_y(state, segment + 1), x, y)
 
 
-@inlined
+@jitable
 def is_blocked(record, state, robot, x, y):  # type: ignore[no-untyped-def]
     """Whether another robot holds the cell or a segment that the robot does not end covers it."""
     if is_held(record, state, robot, x, y):
@@ -134,7 +134,7 @@ def is_blocked(record, state, robot, x, y):  # type: ignore[no-untyped-def]
     return False
 
 
-@inlined
+@jitable
 def is_too_long(record, state, segment):  # type: ignore[no-untyped-def]
     """Whether a segment is longer than L_s."""
     dx = get_x(state, segment + 1) - get_x(state, segment)
@@ -142,7 +142,7 @@ def is_too_long(record, state, segment):  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy > record.largest_square
 
 
-@inlined
+@jitable
 def is_stretched(record, state, robot):  # type: ignore[no-untyped-def]
     """Whether a segment that the robot ends is longer than L_s."""
     return is_too_long(record, state, robot) or (
@@ -150,13 +150,13 @@ def is_stretched(record, state, robot):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
+@jitable
 def is_in_the_way(record, state, robot):  # type: ignore[no-untyped-def]
     """Whether the robot stands where it should not: with another one, or on the hose."""
     return is_blocked(record, state, robot, get_x(state, robot), get_y(state, robot))
 
 
-@inlined
+@jitable
 def find_breaks(record, state, robot, moved):  # type: ignore[no-untyped-def]
     """Returns the constraints that the robot breaks, having moved to another cell or not."""
     events = 0
@@ -169,14 +169,14 @@ def find_breaks(record, state, robot, moved):  # type: ignore[no-untyped-def]
     return events
 
 
-@inlined
+@jitable
 def is_at_goal(record, state, robot, goal):  # type: ignore[no-untyped-def]
     """Whether the robot stands on the goal of that number."""
     at = record.n_robots + 1 + goal
     return get_x(state, robot) == get_x(state, at) and get_y(state, robot) == get_y(state, at)
 
 
-@inlined
+@jitable
 def find_goals(record, state, robot):  # type: ignore[no-untyped-def]
     """Returns the goal events of a move of the robot that broke nothing."""
     if record.goal_mode == ABSENT:
@@ -191,7 +191,7 @@ def find_goals(record, state, robot):  # type: ignore[no-untyped-def]
     return GOAL | ALL_GOALS
 
 
-@inlined
+@jitable
 def move(record, state, robot, direction):  # type: ignore[no-untyped-def]
     """Moves one robot and returns the events, all of them checked on the state after it."""
     x = get_x(state, robot) + step_x(direction)
@@ -233,7 +233,7 @@ def find_line_target(record, state, robot, action):  # type: ignore[no-untyped-d
     return x * (2 * record.half_width + 3) + y
 
 
-@inlined
+@jitable
 def cancel_moves(record, state, packed):  # type: ignore[no-untyped-def]
     """Cancels the moves that leave the grid, then those that robots cannot make together."""
     for robot in range(record.n_robots):
@@ -244,7 +244,7 @@ def cancel_moves(record, state, packed):  # type: ignore[no-untyped-def]
     return joint.settle(record, state, record.n_robots, packed, joint.FIRST)
 
 
-@inlined
+@jitable
 def find_swaps(record, state, packed):  # type: ignore[no-untyped-def]
     """Returns, as bits, the robots that change places with another one."""
     swaps = 0
@@ -261,7 +261,7 @@ def find_swaps(record, state, packed):  # type: ignore[no-untyped-def]
     return swaps
 
 
-@inlined
+@jitable
 def charge_cancelled(record, state, robot, action):  # type: ignore[no-untyped-def]
     """Returns the event for which a robot's move was cancelled, or would be."""
     x = get_x(state, robot) + step_x(action)
@@ -303,13 +303,13 @@ def apply_joint_line(record, state, actions, charged):  # type: ignore[no-untype
     return events
 
 
-@inlined
+@jitable
 def clip(value, bound):  # type: ignore[no-untyped-def]
     """Returns the nearest value in [-bound, bound]."""
     return min(max(value, -bound), bound)
 
 
-@inlined
+@jitable
 def number_offset(record, state, segment):  # type: ignore[no-untyped-def]
     """Returns the number of P_j - P_(j+1) among the offsets that the hose allows."""
     m = record.offset_table.shape[0] // 2
@@ -318,13 +318,13 @@ def number_offset(record, state, segment):  # type: ignore[no-untyped-def]
     return record.offset_table[dx + m, dy + m]
 
 
-@inlined
+@jitable
 def number_cell(record, x, y):  # type: ignore[no-untyped-def]
     """Returns the number of a cell of the grid."""
     return (x + record.half_width) * (2 * record.half_width + 1) + y + record.half_width
 
 
-@inlined
+@jitable
 def observe_robot(record, state, robot, values, at):  # type: ignore[no-untyped-def]
     """Writes p, r_g, d_g, theta_g, r_n, r_p and the four flags of a robot, from place `at` on."""
     h = record.half_width
@@ -366,7 +366,7 @@ def observe_line(record, state, agent, values):  # type: ignore[no-untyped-def]
             values[at + 10 + segment] = number_offset(record, state, segment)
 
 
-@inlined
+@jitable
 def fits(record, state, robot):  # type: ignore[no-untyped-def]
     """Whether the robot and its segment agree with the robots nearer to the source."""
     x, y = get_x(state, robot), get_y(state, robot)
@@ -384,7 +384,7 @@ def fits(record, state, robot):  # type: ignore[no-untyped-def]
     return True
 
 
-@inlined
+@jitable
 def draw_chain(record, state, stream):  # type: ignore[no-untyped-def]
     """Draws the robots' cells uniformly from the feasible set.
 
@@ -399,7 +399,7 @@ def draw_chain(record, state, stream):  # type: ignore[no-untyped-def]
         robot = robot - 1 if fits(record, state, robot) else record.n_robots - 1
 
 
-@inlined
+@jitable
 def place_goals(record, state, stream):  # type: ignore[no-untyped-def]
     """Places the goals: own ones on a feasible chain, a common one where the tip can get."""
     first = record.n_robots + 1
@@ -415,7 +415,7 @@ def place_goals(record, state, stream):  # type: ignore[no-untyped-def]
             put(state, first + goal, record.goals[goal, 0], record.goals[goal, 1])
 
 
-@inlined
+@jitable
 def place_robots(record, state, stream):  # type: ignore[no-untyped-def]
     """Puts the robots on their first cells, fixed or drawn."""
     if record.random_start:
@@ -425,7 +425,7 @@ def place_robots(record, state, stream):  # type: ignore[no-untyped-def]
             put(state, robot, record.starts[robot, 0], record.starts[robot, 1])
 
 
-@inlined
+@jitable
 def is_solved(record, state):  # type: ignore[no-untyped-def]
     """Whether the tip, or with own goals every robot, stands on its goal."""
     for robot in range(record.n_robots if record.own_goals else 1):

@@ -60,7 +60,7 @@ class TaxiSettings:
         if not isinstance(self.passengers, tuple) or not 1 <= len(self.passengers) <= 3:
             raise InputError("passengers", self.passengers, "a tuple of one to three pairs")
         for pair in self.passengers:
-            known = isinstance(pair, tuple) and all(station in STATIONS for station in pair)
+            known = isinstance(pair, tuple) and all(station in list(STATIONS) for station in pair)
             if not known or len(pair) != 2 or pair[0] == pair[1]:
                 valid = "pairs of two different stations of " + ", ".join(STATIONS)
                 raise InputError("passengers", self.passengers, valid)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hose_mj.compiled import inlined
+from hose_mj.compiled import inlined, jitable
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import HEADER, Floats, Integers, begin, end_joint, end_turn
 
@@ -66,13 +66,13 @@ def find_taxi_target(record, state, taxi, action):  # type: ignore[no-untyped-de
     return state[HEADER + taxi] + WIDTH * down + (action == RIGHT) - (action == LEFT)
 
 
-@inlined
+@jitable
 def is_walled(record, state, taxi, action):  # type: ignore[no-untyped-def]
     """Whether a wall is in the way of an action."""
     return action < PICK and record.walls[state[HEADER + taxi], action] == 1
 
 
-@inlined
+@jitable
 def is_held(record, state, taxi, cell):  # type: ignore[no-untyped-def]
     """Whether another taxi stands on the cell."""
     held = False
@@ -81,7 +81,7 @@ def is_held(record, state, taxi, cell):  # type: ignore[no-untyped-def]
     return held
 
 
-@inlined
+@jitable
 def is_blocked(record, state, taxi, action):  # type: ignore[no-untyped-def]
     """Whether a wall or another taxi is in the way of an action."""
     return is_walled(record, state, taxi, action) or is_held(
@@ -89,7 +89,7 @@ def is_blocked(record, state, taxi, action):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
+@jitable
 def is_delivered(record, state):  # type: ignore[no-untyped-def]
     """Whether all passengers are where they want to go."""
     for passenger in range(record.origins.shape[0]):
@@ -98,7 +98,7 @@ def is_delivered(record, state):  # type: ignore[no-untyped-def]
     return True
 
 
-@inlined
+@jitable
 def pick(record, state, taxi):  # type: ignore[no-untyped-def]
     """Takes in a passenger who waits here, if the taxi is empty; returns the events."""
     waiting = -1
@@ -115,7 +115,7 @@ def pick(record, state, taxi):  # type: ignore[no-untyped-def]
     return 0
 
 
-@inlined
+@jitable
 def drop(record, state, taxi):  # type: ignore[no-untyped-def]
     """Lets the taxi's passenger out where he wants to go; returns the events."""
     for passenger in range(record.origins.shape[0]):
@@ -127,7 +127,7 @@ def drop(record, state, taxi):  # type: ignore[no-untyped-def]
     return MISPLACED
 
 
-@inlined
+@jitable
 def act(record, state, taxi, action):  # type: ignore[no-untyped-def]
     """Carries out an action that nothing prevents and returns the events."""
     if action == PICK:
@@ -138,7 +138,7 @@ def act(record, state, taxi, action):  # type: ignore[no-untyped-def]
     return 0
 
 
-@inlined
+@jitable
 def act_jointly(record, state, packed):  # type: ignore[no-untyped-def]
     """Carries out one action of every taxi; returns taxi k's events shifted by 2 k bits."""
     for taxi in range(record.n_taxis):
@@ -193,7 +193,7 @@ def apply_joint_taxi(record, state, actions, charged):  # type: ignore[no-untype
     return events
 
 
-@inlined
+@jitable
 def observe_flags(record, state, taxi, values, at):  # type: ignore[no-untyped-def]
     """Writes whether something is in a taxi's way up, down, left and right, from `at` on."""
     values[at] = is_blocked(record, state, taxi, UP)

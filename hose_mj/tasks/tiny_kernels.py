@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hose_mj.compiled import inlined
+from hose_mj.compiled import inlined, jitable
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import HEADER, TURN, Floats, Integers, begin, end_joint, end_turn
 from hose_mj.tasks.stream import draw_below
@@ -55,7 +55,7 @@ def find_corridor_target(record, state, robot, action):  # type: ignore[no-untyp
     return state[HEADER + robot] + (action == RIGHT) - (action == LEFT)
 
 
-@inlined
+@jitable
 def is_goal_held(record, state):  # type: ignore[no-untyped-def]
     """Whether a robot stands on the goal."""
     held = False

@@ -30,7 +30,6 @@ def test_there_are_as_many_states_as_there_should_be():
     assert len(list(list_states())) == 25 * 24 * (16 - 2)
 
 
-@pytest.mark.slow
 def test_every_action_in_every_state(make_pair):
     pair = make_pair("taxi")
     for state in list_states():

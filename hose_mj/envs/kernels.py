@@ -11,7 +11,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined, kernel
 from hose_mj.tasks.kernels import (
     TURN,
     Floats,
@@ -79,7 +79,7 @@ def forget(charged, felt):  # type: ignore[no-untyped-def]
     felt[:] = 0.0
 
 
-@kernel
+@inlined
 def play_turn(record, state, action, charged, felt):  # type: ignore[no-untyped-def]
     """Lets the agent whose turn it is move, adds to its rows and returns the events."""
     mover = state[TURN]
@@ -90,7 +90,7 @@ def play_turn(record, state, action, charged, felt):  # type: ignore[no-untyped-
     return events
 
 
-@kernel
+@inlined
 def play_round(record, state, actions, charged, felt):  # type: ignore[no-untyped-def]
     """Lets all agents move, each in its turn until the episode ends, and returns all events."""
     forget(charged, felt)
@@ -102,7 +102,7 @@ def play_round(record, state, actions, charged, felt):  # type: ignore[no-untype
     return events
 
 
-@kernel
+@inlined
 def play_joint(record, state, actions, charged, felt):  # type: ignore[no-untyped-def]
     """Lets all agents move at once and returns all events."""
     forget(charged, felt)
@@ -113,7 +113,7 @@ def play_joint(record, state, actions, charged, felt):  # type: ignore[no-untype
     return events
 
 
-@kernel
+@inlined
 def look(record, state, sight, values, seen):  # type: ignore[no-untyped-def]
     """Writes the chosen values (n_seen,); `values` is work space (n_variables,)."""
     last = -1
@@ -125,7 +125,7 @@ def look(record, state, sight, values, seen):  # type: ignore[no-untyped-def]
         seen[place] = values[sight.columns[place]]
 
 
-@kernel
+@inlined
 def allow(record, state, allowed):  # type: ignore[no-untyped-def]
     """Writes the action masks of all agents (n_agents, n_actions)."""
     for agent in range(allowed.shape[0]):
@@ -134,7 +134,7 @@ def allow(record, state, allowed):  # type: ignore[no-untyped-def]
             allowed[agent, action] = bits >> action & 1
 
 
-@kernel
+@inlined
 def play_one(record, batch, sight, actions, at_once, i):  # type: ignore[no-untyped-def]
     """Steps copy `i`, or starts its next episode if the last one has ended."""
     state, charged, felt = batch.states[i], batch.charged[i], batch.felt[i]

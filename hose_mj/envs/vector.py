@@ -24,6 +24,8 @@ from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
+_LEAST_COPIES = 128
+"""With fewer copies for each core, one core is faster than several that wait for each other."""
 _PARTS = 4
 """Parts of the copies for each core: some episodes take longer to start than others."""
 
@@ -45,8 +47,8 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
         observe: names of the variables to show; None for all.
         form: "array", "dict" or "index", as in `TaskEnv`.
         rewards: reward signals whose sum is the reward; None for all.
-        cores: how many to use; None for all. With 1 no thread is started (threads do not survive
-            a fork of the process).
+        cores: how many to use; None for as many as there are with at least 128 copies for each.
+            With 1 no thread is started (threads do not survive a fork of the process).
         render_mode: None; draw a single copy with `TaskEnv`.
         options: options of the task.
 
@@ -77,7 +79,7 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
         self.num_envs = num_envs
         self._at_once = check_moves(moves)
         self._chosen = choose_signals(self.task, rewards)
-        self._cores = min(check_cores(cores), num_envs)
+        self._cores = choose_cores(cores, num_envs)
         parts = min(_PARTS * self._cores, num_envs)
         self._bounds = np.linspace(0, num_envs, parts + 1).astype(np.int64)
         self._view = View(self.task, observe, form, range(self.task.n_agents))
@@ -219,16 +221,11 @@ def make_batch(task: Task, n: int, n_seen: int) -> kernels.Batch:
     )
 
 
-def check_cores(cores: int | None) -> int:
+def choose_cores(cores: int | None, num_envs: int) -> int:
     """Returns how many cores to use; `InputError` unless there are as many."""
-    there = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    there = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     if cores is None:
-        return int(there)
+        return min(there, max(1, num_envs // _LEAST_COPIES))
     if isinstance(cores, bool) or not isinstance(cores, int) or not 1 <= cores <= there:
         raise InputError("cores", cores, f"None or an integer from 1 to {there}")
-    return cores
-
-
-def make_vec(task: str | Task, num_envs: int, **options: Any) -> VectorTaskEnv:
-    """Makes many copies of a task; the options are those of `VectorTaskEnv`."""
-    return VectorTaskEnv(task, num_envs, **options)
+    return min(cores, num_envs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import gymnasium
+import numba
 import numpy as np
 import pettingzoo
 import pytest
@@ -123,7 +124,7 @@ def test_two_of_a_kind_match(id):
 
 @every_id
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("cores", [1, None])
+@pytest.mark.parametrize("cores", [1, numba.config.NUMBA_NUM_THREADS])
 def test_vector_is_the_synchronous_one_but_faster(id, form, cores):
     options = make_small(id, form).unwrapped.spec.kwargs
     del options["task"]

@@ -10,6 +10,9 @@ import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import line_kernels as rules
+
+# The first two are imported for what they register.
+from hose_mj.tasks import line_moves, line_observe, line_starts  # noqa: F401
 from hose_mj.tasks.checks import check_cell, check_cells, check_choice, check_finite, check_integer
 from hose_mj.tasks.kernels import HEADER, Integers
 from hose_mj.tasks.line_geometry import (
@@ -192,7 +195,7 @@ def _list_goal_cells(settings: LineSettings) -> Integers:
 
 
 def _list_variables(settings: LineSettings, n_offsets: int) -> tuple[Variable, ...]:
-    """Lists the variables in the order in which `line_kernels.observe_line` writes them."""
+    """Lists the variables in the order in which `line_observe.observe_line` writes them."""
     cells = (2 * settings.half_width + 1) ** 2
     own = settings.own_goals
     goal = Variable("goal", cells, "goal's cell, (x + h)(2 h + 1) + y + h", own)
@@ -236,7 +239,7 @@ def _check_cells_fit(task: Task) -> None:
             if rules.is_too_long(record, state, robot):
                 longest = f"segments of at most {settings.hose_length} / {record.n_robots} cells"
                 raise InputError(name, getattr(settings, name), longest)
-            if not rules.fits(record, state, robot):
+            if not line_starts.fits(record, state, robot):
                 free = "cells that no other robot holds and the hose does not cover"
                 raise InputError(name, getattr(settings, name), free)
     if fixed_goal and not record.random_start:

@@ -59,7 +59,7 @@ def reset_taxi(record, state, stream):  # type: ignore[no-untyped-def]
 
 
 @joint.find_target.register(Taxi)
-@inlined
+@jitable
 def find_taxi_target(record, state, taxi, action):  # type: ignore[no-untyped-def]
     """Returns the cell that an action leads to if no wall is in its way."""
     down = (action == DOWN) - (action == UP)

@@ -49,7 +49,7 @@ def reset_corridor(record, state, stream):  # type: ignore[no-untyped-def]
 
 
 @joint.find_target.register(Corridor)
-@inlined
+@jitable
 def find_corridor_target(record, state, robot, action):  # type: ignore[no-untyped-def]
     """Returns the cell an action leads to; -1 and n_cells are walls."""
     return state[HEADER + robot] + (action == RIGHT) - (action == LEFT)

@@ -36,7 +36,7 @@ FLOORS = {
     },
     "hose_mj.envs": {
         *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
-        *("hose_mj.world", "hose_mj.constraints", "hose_mj.tasks"),
+        *("hose_mj.world", "hose_mj.constraints", "hose_mj.tasks", "hose_mj.recording"),
     },
 }
 PUBLIC = {

@@ -33,6 +33,7 @@ class Episode:
         events: all events of the last step, as bits.
         terminated: an event has ended the episode.
         truncated: the step limit has.
+        begun: it has been reset at least once.
 
     Raises:
         InputError: an unknown or doubled reward signal.
@@ -49,7 +50,7 @@ class Episode:
         self.chosen = choose_signals(task, rewards)
         self._stream: Stream | None = None
         self._generator: np.random.Generator | None = None
-        self._begun = self._compiled = False
+        self.begun = self._compiled = False
 
     @property
     def turn(self) -> int:
@@ -64,7 +65,7 @@ class Episode:
     @property
     def is_running(self) -> bool:
         """Whether it has begun and not ended."""
-        return self._begun and not (self.terminated or self.truncated)
+        return self.begun and not (self.terminated or self.truncated)
 
     def reset(self, generator: np.random.Generator) -> None:
         """Starts anew. A generator seeds the stream of random numbers when it is first seen."""
@@ -72,7 +73,7 @@ class Episode:
             self._generator, self._stream = generator, make_stream(generator)
         self.state = self.task.reset(self._stream)
         kernels.forget(self.charged, self.felt)
-        self.events, self._begun = 0, True
+        self.events, self.begun = 0, True
         self.terminated = self.truncated = False
 
     def play_turn(self, action: Any) -> None:
@@ -127,7 +128,7 @@ class Episode:
 
     def _check_running(self) -> None:
         if not self.is_running:
-            found = "over" if self._begun else "not begun"
+            found = "over" if self.begun else "not begun"
             raise InputError("episode", found, "one that runs; call reset() first")
 
     def _play(self, play: Callable[..., Any], actions: int | Integers) -> None:

@@ -7,12 +7,16 @@ import re
 import numpy as np
 import pytest
 
+from hose_mj.envs.drawing import Moment
+from hose_mj.envs.grid_episode import make_grid_episode
 from hose_mj.envs.gym import TaskEnv
 from hose_mj.envs.picture import AGENT_COLORS, ROBOT, TAXI, Picture
 from hose_mj.envs.pictures import GOAL_COLOR, make_picture
 from hose_mj.envs.raster import draw_picture
 from hose_mj.envs.registration import IDS
 from hose_mj.envs.text import write_picture
+from hose_mj.errors import InputError
+from hose_mj.recording.rerun import read_recording
 from hose_mj.tasks.registry import make_task
 
 START = ((-4, 3), (0, 3), (2, 0))
@@ -122,6 +126,49 @@ def test_the_caption_says_what_happened():
     env.reset(seed=0)
     env.step((1, 2))
     assert re.search(r"^move 2 · .*goal", env.render().splitlines()[-1])
+
+
+def test_rerun_mode_records_the_episode(tmp_path):
+    """Fixed start and actions: four states of two robots, x to the right and y negated."""
+    env = TaskEnv("corridor", render_mode="rerun")
+    env.reset(seed=5)
+    env.step((2, 2))
+    env.reset(seed=5)
+    for actions in ((0, 2), (2, 1), (1, 2)):
+        env.step(actions)
+    path = tmp_path / "corridor.rrd"
+    path.write_bytes(env.render())
+    summary = read_recording(path)
+    assert summary["application_id"] == "hose_mj"
+    assert summary["timelines"] == ["turn"]
+    rows = {name: entity["rows"] for name, entity in summary["entities"].items()}
+    for name in ("goal_0", "robot_1", "robot_2"):
+        assert rows[f"/grid/{name}"] == 4
+    assert rows["/reward"] == rows["/events"] == 4
+    assert summary["entities"]["/grid/lines"]["static"] == 1
+
+
+def test_what_is_recorded_is_what_happened():
+    env = TaskEnv("line", n_robots=3, start=START, goal=(-6, -5), moves="turns")
+    env.reset(seed=0)
+    moments = [Moment(env.state(), 0, 0.0)]
+    env.step((0, 4, 4))
+    moments.append(Moment(env.state(), env.episode.events, -1.0))
+    grid = make_grid_episode(env.task, moments)
+    assert grid.turns.tolist() == [0, 3]
+    assert grid.rewards.tolist() == [0.0, -1.0]
+    assert grid.hose[1].tolist() == [[-4, 4], [0, 3], [2, 0], [0, 0]]
+    tip = next(track for track in grid.tracks if track.label == "0")
+    assert tip.points.tolist() == [[-4, 3], [-4, 4]]
+    assert grid.lines.shape == (44, 2, 2)
+    assert grid.lines.min() == -10.5
+    assert grid.events[0] == "-"
+
+
+@pytest.mark.parametrize("mode", ["ansi", "rgb_array", "rerun"])
+def test_nothing_to_draw_before_the_first_reset(mode):
+    with pytest.raises(InputError, match="call reset"):
+        TaskEnv("maze", render_mode=mode).render()
 
 
 def test_human_mode_writes_every_step(capsys):

@@ -105,6 +105,8 @@ class LineSettings:
             if x * x + y * y > self.hose_length**2:
                 valid = f"a cell within the hose's length {self.hose_length} of the source"
                 raise InputError("goal", self.goal, valid)
+            if self.goal == (0, 0) and self.n_robots > 1 and self.collision != "robots":
+                raise InputError("goal", self.goal, "a cell other than the source's, which is held")
 
 
 def make_line(settings: LineSettings) -> Task:

@@ -22,6 +22,7 @@ from hose_mj.tasks.stream import make_stream
         ("line", {"goal": (11, 0)}, "goal"),
         ("line", {"goal": (4, 4), "hose_length": 5}, "goal"),
         ("line", {"goal": "nowhere"}, "goal"),
+        ("line", {"goal": (0, 0)}, "goal"),
         ("line", {"start": ((0, 0),)}, "start"),
         ("line", {"start": "anywhere"}, "start"),
         ("line", {"n_robots": 2, "start": ((5, 0), (0.5, 0))}, "start"),

@@ -115,7 +115,8 @@ class Episode:
     def make_masks(self) -> kernels.Flags:
         """Returns the action masks, a new array (n_agents, n_actions)."""
         allowed = np.empty((self.task.n_agents, self.task.n_actions), np.int8)
-        kernels.allow(self.task.kernel, self.state, allowed)
+        record = self.task.kernel
+        kernels.choose(kernels.allow, record)(record, self.state, allowed)
         return allowed
 
     def compute_agent_rewards(self) -> Floats:
@@ -132,8 +133,10 @@ class Episode:
             raise InputError("episode", found, "one that runs; call reset() first")
 
     def _play(self, play: Callable[..., Any], actions: int | Integers) -> None:
+        record = self.task.kernel
+        play = kernels.choose(play, record)
         with nullcontext() if self._compiled else compile_notice(f"task {self.task.id}"):
-            events = play(self.task.kernel, self.state, actions, self.charged, self.felt)
+            events = play(record, self.state, actions, self.charged, self.felt)
         self._compiled = True
         self.events = int(events)
         self.terminated = bool(self.events & self.task.kernel.terminal)

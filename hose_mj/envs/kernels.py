@@ -5,13 +5,14 @@ The first argument of each function is the task's kernel record, as in `hose_mj.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.compiled import inlined, kernel
+from hose_mj.compiled import jitable, kernel
 from hose_mj.tasks.kernels import (
     TURN,
     Floats,
@@ -72,14 +73,14 @@ class Batch(NamedTuple):
     truncated: Flags
 
 
-@kernel
+@jitable
 def forget(charged, felt):  # type: ignore[no-untyped-def]
     """Clears what the last step left: the agents' events, and who felt what; see `Batch`."""
     charged[:] = 0
     felt[:] = 0.0
 
 
-@inlined
+@jitable
 def play_turn(record, state, action, charged, felt):  # type: ignore[no-untyped-def]
     """Lets the agent whose turn it is move, adds to its rows and returns the events."""
     mover = state[TURN]
@@ -90,7 +91,7 @@ def play_turn(record, state, action, charged, felt):  # type: ignore[no-untyped-
     return events
 
 
-@inlined
+@jitable
 def play_round(record, state, actions, charged, felt):  # type: ignore[no-untyped-def]
     """Lets all agents move, each in its turn until the episode ends, and returns all events."""
     forget(charged, felt)
@@ -102,7 +103,7 @@ def play_round(record, state, actions, charged, felt):  # type: ignore[no-untype
     return events
 
 
-@inlined
+@jitable
 def play_joint(record, state, actions, charged, felt):  # type: ignore[no-untyped-def]
     """Lets all agents move at once and returns all events."""
     forget(charged, felt)
@@ -113,7 +114,7 @@ def play_joint(record, state, actions, charged, felt):  # type: ignore[no-untype
     return events
 
 
-@inlined
+@jitable
 def look(record, state, sight, values, seen):  # type: ignore[no-untyped-def]
     """Writes the chosen values (n_seen,); `values` is work space (n_variables,)."""
     last = -1
@@ -125,7 +126,7 @@ def look(record, state, sight, values, seen):  # type: ignore[no-untyped-def]
         seen[place] = values[sight.columns[place]]
 
 
-@inlined
+@jitable
 def allow(record, state, allowed):  # type: ignore[no-untyped-def]
     """Writes the action masks of all agents (n_agents, n_actions)."""
     for agent in range(allowed.shape[0]):
@@ -134,7 +135,7 @@ def allow(record, state, allowed):  # type: ignore[no-untyped-def]
             allowed[agent, action] = bits >> action & 1
 
 
-@inlined
+@jitable
 def play_one(record, batch, sight, actions, at_once, i):  # type: ignore[no-untyped-def]
     """Steps copy `i`, or starts its next episode if the last one has ended."""
     state, charged, felt = batch.states[i], batch.charged[i], batch.felt[i]
@@ -155,7 +156,7 @@ def play_one(record, batch, sight, actions, at_once, i):  # type: ignore[no-unty
     allow(record, state, batch.allowed[i])
 
 
-@kernel
+@jitable
 def play_some(record, batch, sight, actions, at_once, begin, end):  # type: ignore[no-untyped-def]
     """Steps the copies begin .. end - 1 on one core; `actions` is (n, n_agents)."""
     for i in range(begin, end):
@@ -171,3 +172,14 @@ def play_all(record, batch, sight, actions, at_once, bounds):  # type: ignore[no
     """
     for part in numba.prange(bounds.shape[0] - 1):
         play_some(record, batch, sight, actions, at_once, bounds[part], bounds[part + 1])
+
+
+_COMPILED = {
+    function: kernel(function)
+    for function in (play_turn, play_round, play_joint, look, allow, play_some)
+}
+
+
+def choose(function: Callable[..., Any], record: Any) -> Callable[..., Any]:
+    """Returns the function, compiled for a compiled task and as it stands for one in Python."""
+    return _COMPILED[function] if isinstance(record, tuple) else function

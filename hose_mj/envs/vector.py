@@ -162,9 +162,10 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
                 stream[:] = make_stream(seeding.np_random(one)[0])
 
     def _play(self, actions: Integers) -> None:
-        arguments = self.task.kernel, self._batch, self._view.sight, actions, self._at_once
-        if self._cores == 1:
-            kernels.play_some(*arguments, 0, self.num_envs)
+        record = self.task.kernel
+        arguments = record, self._batch, self._view.sight, actions, self._at_once
+        if self._cores == 1 or not isinstance(record, tuple):
+            kernels.choose(kernels.play_some, record)(*arguments, 0, self.num_envs)
             return
         before = numba.get_num_threads()
         numba.set_num_threads(self._cores)

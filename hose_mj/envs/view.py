@@ -63,7 +63,8 @@ class View:
     def look(self, record: Any, state: Integers) -> Integers:
         """Returns the values seen in a state, a new array (n_seen,)."""
         seen = np.empty(len(self.names), np.int64)
-        kernels.look(record, state, self.sight, self._values, seen)
+        look = kernels.choose(kernels.look, record)
+        look(record, state, self.sight, self._values, seen)
         return seen
 
     def make_space(self) -> spaces.Space[Any]:

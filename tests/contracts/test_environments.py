@@ -123,8 +123,11 @@ def test_two_of_a_kind_match(id):
 
 
 @every_id
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("cores", [1, numba.config.NUMBA_NUM_THREADS])
+@pytest.mark.parametrize(
+    ("form", "cores"),
+    [("array", 1), ("array", numba.config.NUMBA_NUM_THREADS), ("dict", 1), ("index", 1)],
+    ids=["array", "array-all-cores", "dict", "index"],
+)
 def test_vector_is_the_synchronous_one_but_faster(id, form, cores):
     options = make_small(id, form).unwrapped.spec.kwargs
     del options["task"]

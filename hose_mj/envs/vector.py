@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import os
 from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any
@@ -167,6 +169,7 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
         if self._cores == 1 or not isinstance(record, tuple):
             kernels.choose(kernels.play_some, record)(*arguments, 0, self.num_envs)
             return
+        start_threads()
         before = numba.get_num_threads()
         numba.set_num_threads(self._cores)
         try:
@@ -220,6 +223,23 @@ def make_batch(task: Task, n: int, n_seen: int) -> kernels.Batch:
         terminated=np.zeros(n, flags),
         truncated=np.zeros(n, flags),
     )
+
+
+@functools.cache
+def start_threads() -> None:
+    """Starts numba's threads so that they sleep between calls instead of keeping cores busy.
+
+    GNU OpenMP reads this from the environment once, when it is loaded. Where other processes want
+    the cores too, threads that spin make a step ten times slower.
+    """
+    name = "OMP_WAIT_POLICY"
+    chosen = os.environ.get(name)
+    os.environ[name] = chosen or "passive"
+    try:
+        numba.get_num_threads()
+    finally:
+        if chosen is None:
+            del os.environ[name]
 
 
 def choose_cores(cores: int | None, num_envs: int) -> int:

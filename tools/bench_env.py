@@ -39,7 +39,8 @@ def measure(quick: bool, seed: int) -> Bench:
         named = None if peer is None else PEER
         bench.records.append(Record("env", name, value, "moves/s", named, ratio))
 
-    taxi = rate(step_gymnasium("Taxi-v4", 1, seed))
+    newest = max(id for id in gymnasium.registry if id.startswith("Taxi-v"))
+    taxi = rate(step_gymnasium(newest, 1, seed))
     record(PEER, taxi)
     for n_robots in (MAIN,) if quick else N_ROBOTS:
         moves = rate(play_compiled(n_robots, seed))

@@ -24,7 +24,8 @@ GROUPS = {"env": "tools.bench_env", "hose": "tools.bench_hose"}
 class Args:
     """Measure speed: compiled tasks and environments (env), hose models (hose).
 
-    Every number is the best of several rounds on this machine, after compilation.
+    Every number is the best of several rounds on this machine, after compilation, in seconds of the
+    processor where one core works and of the wall clock where several do.
     """
 
     group: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="{env,hose}")]

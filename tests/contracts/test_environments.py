@@ -112,6 +112,21 @@ def test_random_play_stays_in_the_spaces(id, form):
             observation, info = env.reset()
 
 
+@pytest.mark.parametrize("n_robots", range(1, 9))
+@pytest.mark.parametrize("id", [id for id in IDS if "Line" in id and "2015" not in id])
+def test_every_number_of_robots(id, n_robots):
+    env = gymnasium.make(id, n_robots=n_robots).unwrapped
+    assert env.task.n_agents == (1 if id in ALONE else n_robots)
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    for _ in range(60):
+        observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
+        assert env.observation_space.contains(observation)
+        if terminated or truncated:
+            observation, _ = env.reset()
+            assert env.observation_space.contains(observation)
+
+
 @every_id
 def test_two_of_a_kind_match(id):
     check_environments_match(

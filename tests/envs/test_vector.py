@@ -60,3 +60,21 @@ def test_threads_leave_the_environment_and_numbas_settings_alone():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_kernels_are_found_on_disk_by_the_next_process():
+    code = (
+        "import numpy as np; from hose_mj.envs import kernels;"
+        "from hose_mj.envs.gym import TaskEnv; from hose_mj.envs.vector import VectorTaskEnv;"
+        "env = TaskEnv('maze'); env.reset(seed=0); env.step(0);"
+        f"[VectorTaskEnv('maze', 4, cores=cores).reset(seed=0) for cores in (1, {CORES})];"
+        "functions = [kernels.play_all, *kernels._COMPILED.values()];"
+        "print(sum(sum(f.stats.cache_misses.values()) for f in functions));"
+        "print(sum(sum(f.stats.cache_hits.values()) for f in functions))"
+    )
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    misses, hits = map(int, done.stdout.split())
+    assert misses == 0
+    assert hits >= 4

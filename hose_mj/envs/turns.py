@@ -105,13 +105,14 @@ class TurnsEnv(AECEnv[str, Any, Any]):
         episode.play_turn(action)
         self._cycles[mover] = _Cycle(len(self.task.rewards))
         self._cumulative_rewards[self.agent_selection] = 0.0
-        for number, agent in enumerate(self.agents):
-            felt = episode.felt[mover, number]
-            self.rewards[agent] = float(sum_signals(felt, episode.chosen))
-            self.terminations[agent] = episode.terminated
-            self.truncations[agent] = episode.truncated
+        felt = episode.felt[mover]  # (agents, n_signals)
+        rewards = sum_signals(felt, episode.chosen).tolist()
+        self.rewards = dict(zip(self.agents, rewards, strict=True))
+        self.terminations = dict.fromkeys(self.agents, episode.terminated)
+        self.truncations = dict.fromkeys(self.agents, episode.truncated)
+        for number, cycle in enumerate(self._cycles):
             charged = episode.events if number == mover else 0
-            self._cycles[number].add(self.rewards[agent], felt, episode.events, charged)
+            cycle.add(rewards[number], felt[number], episode.events, charged)
         self._accumulate_rewards()
         self._write_infos()
         self.agent_selection = self.agents[episode.turn]

@@ -19,9 +19,10 @@ FLOORS = {
     "hose_mj.errors": set(),
     "hose_mj.assets": {"hose_mj.errors"},
     "hose_mj.checks": {"hose_mj.errors"},
+    "hose_mj.compiled": set(),
     "hose_mj.recording": {"hose_mj.errors", "hose_mj.checks"},
     "hose_mj.hoses.spec": {"hose_mj.errors"},
-    "hose_mj.hoses": {"hose_mj.errors", "hose_mj.hoses.spec"},
+    "hose_mj.hoses": {"hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses.spec"},
     "hose_mj.scenes": {"hose_mj.assets", "hose_mj.errors", "hose_mj.hoses.spec"},
     "hose_mj.validation": {
         *("hose_mj.errors", "hose_mj.checks", "hose_mj.hoses", "hose_mj.hoses.spec"),
@@ -32,18 +33,20 @@ FLOORS = {
         *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
     },
     "hose_mj.tasks": {
-        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
-        "hose_mj.constraints",
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
+        *("hose_mj.world", "hose_mj.constraints"),
     },
     "hose_mj.envs": {
-        *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
-        *("hose_mj.constraints", "hose_mj.tasks"),
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
+        *("hose_mj.world", "hose_mj.constraints", "hose_mj.tasks", "hose_mj.recording"),
     },
 }
-PUBLIC = {"hose_mj.envs", "hose_mj.tasks", "hose_mj.recording", "hose_mj.errors"}
+PUBLIC = {
+    *("hose_mj.compiled", "hose_mj.envs", "hose_mj.errors", "hose_mj.recording", "hose_mj.tasks"),
+}
 PACKAGES = ("hose_mj", "learning", "tools")
 HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy"}
-JIT = {"compiled", "jit", "kernel", "njit", "vectorize", "guvectorize"}
+JIT = {"compiled", "inlined", "jit", "jitable", "kernel", "njit", "vectorize", "guvectorize"}
 
 
 class Import(NamedTuple):

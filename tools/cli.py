@@ -25,6 +25,7 @@ class Command:
 
 
 COMMANDS = {
+    "bench": Command("tools.bench", "measure speed beside peers that people know"),
     "compare": Command(
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),

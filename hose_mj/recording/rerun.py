@@ -8,7 +8,12 @@ Parquet is the durable record, the .rrd is the view of it. Entity paths of a rec
     /<scene>/legend                      names in the tracks' colours (static)
     /<scene>/series/<unit>/<series>      numbers over time; .../limit is the series' bound
 
-The one timeline is `sim_time`, simulated seconds.
+The one timeline is `sim_time`, simulated seconds. An episode on a grid has `turn` instead, and
+
+    /grid/lines                          grid and walls (static)
+    /grid/hose                           the hose
+    /grid/<track>                        what stands on a cell
+    /reward, /events                     of the step that led to a turn
 """
 
 from __future__ import annotations
@@ -29,6 +34,7 @@ from hose_mj.recording.captions import format_legend, format_settings, name_quan
 from hose_mj.recording.episode import Array, HoseTrack, Scene, Series, check_unique
 from hose_mj.recording.files import make_temp_beside, replace_atomically, write_atomically
 from hose_mj.recording.framing import Framing, compute_framing
+from hose_mj.recording.grid import GridEpisode
 from hose_mj.recording.palette import LIMIT, Rgb, find_color, lighten, name_model
 from hose_mj.recording.viewer import Viewer, start_viewer
 
@@ -71,6 +77,39 @@ def write_recording(
         replace_atomically(temp, Path(path))
     finally:
         temp.unlink(missing_ok=True)
+
+
+def encode_grid_episode(episode: GridEpisode) -> bytes:
+    """Returns the .rrd of an episode on a grid; y is negated, as the viewer counts rows down."""
+    stream = rr.RecordingStream(APPLICATION_ID)
+    sink = rr.binary_stream(stream)
+    down = np.array([1.0, -1.0])
+    turns = [rr.TimeColumn("turn", sequence=episode.turns)]
+    stream.send_blueprint(
+        rrb.Horizontal(
+            rrb.Spatial2DView(origin="/grid", name=episode.title),
+            rrb.Vertical(
+                rrb.TimeSeriesView(origin="/reward", name="reward"),
+                rrb.TextLogView(origin="/events", name="events"),
+            ),
+            column_shares=[2.0, 1.0],
+        )
+    )
+    lines = rr.LineStrips2D(episode.lines * down, colors=[(70, 74, 82)], radii=[0.02])
+    stream.log("grid/lines", lines, static=True)
+    if episode.hose is not None:
+        style = rr.LineStrips2D.from_fields(colors=[(196, 165, 92)], radii=[0.12])
+        stream.log("grid/hose", style, static=True)
+        strips = rr.LineStrips2D.columns(strips=list(episode.hose * down))
+        stream.send_columns("grid/hose", turns, strips)
+    for track in episode.tracks:
+        path = f"grid/{rr.escape_entity_path_part(track.name)}"
+        look = rr.Points2D.from_fields(colors=[track.color], radii=[0.4], labels=[track.label])
+        stream.log(path, look, static=True)
+        stream.send_columns(path, turns, rr.Points2D.columns(positions=track.points * down))
+    stream.send_columns("reward", turns, rr.Scalars.columns(scalars=episode.rewards))
+    stream.send_columns("events", turns, rr.TextLog.columns(text=list(episode.events)))
+    return bytes(sink.read(flush=True) or b"")
 
 
 def read_recording(path: Path) -> dict[str, Any]:

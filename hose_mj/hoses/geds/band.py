@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.compiled import kernel
 
 
 @kernel

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hose_mj.hoses.geds.compiled import compiled
+from hose_mj.compiled import compiled
 from hose_mj.hoses.model import Array
 
 DEGREE = 3

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, frames, mechanics, schemes
-from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.holds import HoldSet
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline

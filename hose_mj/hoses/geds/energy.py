@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hose_mj.compiled import kernel
 from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
-from hose_mj.hoses.geds.compiled import kernel
 from hose_mj.hoses.geds.frames import move_clamp_frames
 from hose_mj.hoses.geds.rod import compute_rod_strains, set_rod
 from hose_mj.hoses.geds.span import (

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
-from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.rod import move_frame
 from hose_mj.hoses.geds.span import compute_derivatives
 from hose_mj.hoses.geds.twist import carry, compute_tangent

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import solver, stretches
-from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.frames import lay_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline

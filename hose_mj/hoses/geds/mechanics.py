@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hose_mj.compiled import compile_notice, run_kernel
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, schemes, solver
-from hose_mj.hoses.geds.compiled import compile_notice, run_kernel
 from hose_mj.hoses.geds.fittings import average, make_cells
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds import mechanics, schemes, solver, statics
 from hose_mj.hoses.geds.body import SplineBody
-from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count, check_vector

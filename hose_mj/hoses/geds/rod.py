@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.compiled import kernel
 from hose_mj.hoses.geds.span import SMALLEST_A
 
 TANGENT, SLOPE, DIRECTOR, RATE = 0, 3, 6, 9

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.geds.band import factorize
-from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.solver import (
     DEPENDENT_HOLDS,

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.geds.band import (
     factorize,
     factorize_indefinite,
@@ -24,7 +25,6 @@ from hose_mj.hoses.geds.band import (
     solve_upper,
 )
 from hose_mj.hoses.geds.basis import Tables
-from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
 from hose_mj.hoses.geds.span import Elasticity, Span, make_span

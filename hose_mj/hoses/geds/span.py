@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import compiled, kernel
+from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.model import Array
 
 SMALLEST_A = 0.01

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hose_mj.compiled import run_kernel
 from hose_mj.hoses.geds import frames, schemes, solver, twist
-from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.model import Array
 
 MOST_LOAD_STEPS = 64

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from hose_mj.compiled import run_kernel
 from hose_mj.hoses.geds import solver
-from hose_mj.hoses.geds.compiled import run_kernel
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, measure_twist

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.compiled import kernel
+from hose_mj.compiled import kernel
 from hose_mj.hoses.geds.span import compute_derivatives
 from hose_mj.hoses.model import Array
 

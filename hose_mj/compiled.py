@@ -1,0 +1,106 @@
+"""How kernels are compiled: once per machine, kept on disk, with arithmetic that still sees a NaN.
+
+`nnan` and `ninf` are left out of the fast-math flags on purpose: with them a banded Cholesky
+factorization accepts a pivot that is not a number.
+
+A kernel that serves hoses in a plane and in space takes `axes`, a tuple of two or three zeros: its
+length is part of its type, so one source compiles into one specialised version for each.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import IndexDataCacheFile
+from numba.extending import register_jitable
+
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "fastmath": {"contract", "reassoc", "arcp", "nsz"},
+    "error_model": "numpy",
+}
+_ROOT = Path(__file__).resolve().parent.parent
+
+
+@cache
+def _read_fingerprint(folder: Path) -> str:
+    """A hash of all sources below a folder that have kernels in them."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*.py")):
+        text = file.read_bytes()
+        if b"hose_mj.compiled import" in text:
+            digest.update(text)
+    return digest.hexdigest()[:12]
+
+
+def _find_fingerprint(function: Callable[..., Any]) -> str:
+    """What a function's machine code depends on: its own part of the package, and the tasks."""
+    parts = Path(function.__code__.co_filename).resolve().relative_to(_ROOT).parts
+    folder = _ROOT.joinpath(*parts[: 1 if parts[0] == "learning" else 2])
+    if folder == _ROOT / "hose_mj" / "hoses" or not folder.is_dir():
+        return _read_fingerprint(folder)
+    return _read_fingerprint(folder) + _read_fingerprint(_ROOT / "hose_mj" / "tasks")
+
+
+def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """njit with these options and a disk cache that notices a change in any kernel it inlines.
+
+    numba looks at a function's own file only: after an update it would go on with the old code of
+    what is inlined from other files. So the name of the cache file holds a fingerprint.
+    """
+
+    def decorator(function: Callable[..., Any]) -> Any:
+        made = numba.njit(**_OPTIONS, **options)(function)
+        own = getattr(made._cache, "_impl", None)  # none where numba finds no place for a cache
+        if own is not None and _ROOT in Path(function.__code__.co_filename).resolve().parents:
+            name = f"{own.filename_base}.{_find_fingerprint(function)}"
+            stamp = own.locator.get_source_stamp()
+            place = made._cache._cache_path
+            made._cache._cache_file = IndexDataCacheFile(place, name, stamp)  # type: ignore[no-untyped-call]
+        return made
+
+    return decorator
+
+
+compiled = _decorate()
+# _nrt=False (no allocation inside) is left out of numba's types.
+kernel = _decorate(_nrt=False)
+# For small functions of a record with many fields, which a call would have to copy one by one.
+inlined = _decorate(_nrt=False, forceinline=True)
+# Compiled into compiled callers; for others it stays plain Python, whatever its arguments are.
+jitable: Any = register_jitable(forceinline=True, error_model="numpy")
+
+
+@contextmanager
+def compile_notice(what: str) -> Iterator[None]:
+    """Says on stderr that kernels are being compiled when the block takes over a second."""
+    notice = f"hose_mj: compiling the {what} (once on this machine, under 30 s) ...\n"
+    timer = threading.Timer(1.0, lambda: sys.stderr.write(notice))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+_called: set[tuple[Callable[..., Any], int]] = set()
+
+
+def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
+    """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
+    version = (kernel, len(axes))
+    if version in _called:
+        return kernel(axes, *arguments)
+    with compile_notice("GEDS kernels"):
+        result = kernel(axes, *arguments)
+    _called.add(version)
+    return result

@@ -1,0 +1,1 @@
+"""Grid tasks of the thesis: rules compiled on an array of integers, open to compiled loops."""

@@ -1,0 +1,226 @@
+"""What every task can do, one function name for all of them, in compiled and in plain Python code.
+
+The first argument of each function is the task's kernel record, whose type selects the code: a
+NamedTuple of numbers and arrays for a compiled task, any other object for one in plain Python. A
+loop written with these functions compiles for the former, with the task's code inlined and the
+result kept on disk, and runs unchanged for the latter.
+
+The state is one int64 array. `state[TURN]` is the agent to move, `state[STEPS]` counts the moves of
+single agents since the reset, and what follows is the task's own. Events are bits of one integer.
+
+Every record has these fields:
+
+- `n_agents`, `n_actions`: actions are 0 .. n_actions - 1 for each agent;
+- `step_limit`: moves of single agents after which an episode is cut off; a joint move counts
+  n_agents of them;
+- `terminal`: the events that end an episode;
+- `violations`: the events that break a constraint;
+- `success`: the events that mean that the task is done;
+- `shared`: the events that every agent is rewarded for; the others concern the mover alone;
+- `reward_table`: reward of each set of events, by signal (2^n_events, n_signals).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba.extending import overload
+
+from hose_mj.compiled import compiled, jitable
+from hose_mj.tasks.stream import draw_below
+
+TURN, STEPS = 0, 1
+HEADER = 2
+"""Where a task's own part of the state begins."""
+
+Integers = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+
+def dispatched(function: Callable[..., Any]) -> Any:
+    """Makes a function whose code depends on the type of its first argument.
+
+    Like `functools.singledispatch`, and with `register` as there, but compiled code may call it
+    too. (Compiled functions handed over as arguments would miss the cache in every process.)
+    """
+    function = functools.singledispatch(function)
+
+    @overload(function)
+    def choose(record, *arguments):  # type: ignore[no-untyped-def]
+        implementation = function.dispatch(record.instance_class)
+
+        def call(record, *arguments):  # type: ignore[no-untyped-def]
+            return implementation(record, *arguments)
+
+        return call
+
+    return function
+
+
+@dispatched
+def reset(record: Any, state: Integers, stream: npt.NDArray[np.uint64]) -> None:
+    """Writes an initial state; every random choice is drawn from the stream."""
+    raise NotImplementedError(type(record).__name__)
+
+
+@dispatched
+def apply(record: Any, state: Integers, agent: int, action: int) -> int:
+    """Lets one agent move, advances turn and step count, and returns the events."""
+    raise NotImplementedError(type(record).__name__)
+
+
+@dispatched
+def apply_joint(record: Any, state: Integers, actions: Integers, charged: Integers) -> int:
+    """Lets all agents move at once and returns all events.
+
+    Args:
+        record: the task's kernel record.
+        state: advanced in place; the turn goes back to agent 0.
+        actions: one for each agent (n_agents,).
+        charged: the events that each agent caused (n_agents,), written in place.
+    """
+    raise NotImplementedError(type(record).__name__)
+
+
+@dispatched
+def observe(record: Any, state: Integers, agent: int, values: Integers) -> None:
+    """Writes the values of the task's variables as the agent sees them (n_variables,).
+
+    Each lies in 0 .. cardinality - 1, in a state that broke a constraint too (clipped there).
+    """
+    raise NotImplementedError(type(record).__name__)
+
+
+@dispatched
+@jitable
+def mask(record, state, agent):  # type: ignore[no-untyped-def]
+    """Returns the available actions as bits; all of them, unless the task says otherwise."""
+    return (1 << record.n_actions) - 1
+
+
+@jitable
+def begin(state):  # type: ignore[no-untyped-def]
+    """Sets turn and step count of an initial state."""
+    state[TURN] = 0
+    state[STEPS] = 0
+
+
+@jitable
+def end_turn(record, state, agent):  # type: ignore[no-untyped-def]
+    """Hands the turn to the next agent and counts the move."""
+    state[TURN] = agent + 1 if agent + 1 < record.n_agents else 0
+    state[STEPS] += 1
+
+
+@jitable
+def end_joint(record, state):  # type: ignore[no-untyped-def]
+    """Hands the turn to agent 0 and counts a move of every agent."""
+    state[TURN] = 0
+    state[STEPS] += record.n_agents
+
+
+@jitable
+def is_over(record, events):  # type: ignore[no-untyped-def]
+    """Whether the events end the episode."""
+    return events & record.terminal != 0
+
+
+@jitable
+def is_cut_off(record, state):  # type: ignore[no-untyped-def]
+    """Whether the step limit is reached."""
+    return state[STEPS] >= record.step_limit
+
+
+@jitable
+def add_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyped-def]
+    """Adds what the agent gets for the events of a move of `mover`, by signal (n_signals,)."""
+    felt = events if agent == mover else events & record.shared
+    for signal in range(rewards.shape[0]):
+        rewards[signal] += record.reward_table[felt, signal]
+
+
+@jitable
+def compute_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyped-def]
+    """Writes what the agent gets for the events of a move of `mover`, by signal (n_signals,)."""
+    rewards[:] = 0.0
+    add_rewards(record, events, mover, agent, rewards)
+
+
+@jitable
+def compute_joint_rewards(record, charged, agent, rewards):  # type: ignore[no-untyped-def]
+    """Writes what the agent gets for a joint move, by signal (n_signals,).
+
+    It is the sum over the movers of what `compute_rewards` gives for each one's events.
+    """
+    rewards[:] = 0.0
+    for mover in range(record.n_agents):
+        add_rewards(record, charged[mover], mover, agent, rewards)
+
+
+@jitable
+def compute_safe_mask(record, state, agent, scratch):  # type: ignore[no-untyped-def]
+    """Returns, as bits, the available actions that break no constraint at once.
+
+    It tries each of them on `scratch`, an array of the state's length.
+    """
+    available = mask(record, state, agent)
+    safe = 0
+    for action in range(record.n_actions):
+        if available >> action & 1:
+            for k in range(state.shape[0]):
+                scratch[k] = state[k]
+            if apply(record, scratch, agent, action) & record.violations == 0:
+                safe |= 1 << action
+    return safe
+
+
+class Projection(NamedTuple):
+    """A set of variables as one mixed-radix number; made by `variables.make_projection`.
+
+    Attributes:
+        columns: the variables' places among all (k,), the fastest running one last.
+        strides: what a step of each adds to the index (k,).
+        size: number of different indices.
+    """
+
+    columns: Integers
+    strides: Integers
+    size: int
+
+
+@jitable
+def project(projection, values):  # type: ignore[no-untyped-def]
+    """Returns the index of the values (n_variables,) that `observe` wrote."""
+    index = 0
+    for k in range(projection.columns.shape[0]):
+        index += values[projection.columns[k]] * projection.strides[k]
+    return index
+
+
+@compiled
+def run_random(record, state, stream, n_moves, values, counts):  # type: ignore[no-untyped-def]
+    """Plays random moves, agents in turn, observing before each one; for timing and tests.
+
+    Args:
+        record: the task's kernel record.
+        state: an initial state, advanced in place through as many episodes as it takes.
+        stream: random numbers for the actions and the resets.
+        n_moves: number of moves.
+        values: work array of the observed values (n_variables,).
+        counts: raised in place: episodes ended, successes, violations, sum of all values (4,).
+    """
+    for _ in range(n_moves):
+        agent = state[TURN]
+        observe(record, state, agent, values)
+        for value in values:
+            counts[3] += value
+        events = apply(record, state, agent, draw_below(stream, record.n_actions))
+        counts[1] += events & record.success != 0
+        counts[2] += events & record.violations != 0
+        if is_over(record, events) or is_cut_off(record, state):
+            counts[0] += 1
+            reset(record, state, stream)

@@ -1,0 +1,117 @@
+"""The tasks by id, imported when they are made."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, cast
+
+from hose_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from hose_mj.tasks.task import Task
+
+
+@dataclass(frozen=True)
+class TaskEntry:
+    """Where a task is and what it is.
+
+    Attributes:
+        module: module with the settings class and the factory, which takes the settings.
+        settings: name of the settings class.
+        factory: name of the factory.
+        description: one line for listings.
+        presets: settings that make the id; they cannot be given.
+        defaults: settings that differ from the class's defaults; they can.
+    """
+
+    module: str
+    settings: str
+    factory: str
+    description: str
+    presets: Mapping[str, Any] = field(default_factory=dict)
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+
+
+_LINE = ("hose_mj.tasks.line", "LineSettings", "make_line")
+_TAXI = ("hose_mj.tasks.taxi", "TaxiSettings", "make_taxi")
+TASKS: dict[str, TaskEntry] = {
+    "line": TaskEntry(
+        *_LINE,
+        "robots pull a hose of line segments to a common goal (B.2)",
+        {"own_goals": False, "single_agent": False},
+    ),
+    "line-non-cooperative": TaskEntry(
+        *_LINE,
+        "robots pull a hose of line segments, each to a goal of its own (B.2)",
+        {"own_goals": True, "single_agent": False},
+    ),
+    "line-single-agent": TaskEntry(
+        *_LINE,
+        "one agent moves all robots of the hose, one at a time (chapter 5)",
+        {"own_goals": False, "single_agent": True},
+    ),
+    "line-2015": TaskEntry(
+        *_LINE,
+        "the author's experiment of 2015: four robots, fixed start and goal",
+        {"own_goals": False, "single_agent": False},
+        {
+            "half_width": 9,
+            "start": ((2, 5), (2, 3), (3, 1), (1, 2)),
+            "goal": (-2, -2),
+            "collision": "robots",
+            "move_rule": "cancelling",
+            "goal_reward": 10.0,
+            "violation_reward": -1.0,
+            "step_limit": 1600,
+        },
+    ),
+    "taxi": TaskEntry(
+        *_TAXI,
+        "two taxis and two passengers on Dietterich's map (B.3)",
+        {"single_agent": False},
+    ),
+    "taxi-single-agent": TaskEntry(
+        *_TAXI,
+        "one agent chooses for both taxis at once (section 5.5.2)",
+        {"single_agent": True},
+    ),
+    "corridor": TaskEntry(
+        "hose_mj.tasks.tiny",
+        "CorridorSettings",
+        "make_corridor",
+        "two robots in a corridor of three cells (Example 1, section 6.4)",
+    ),
+    "maze": TaskEntry(
+        "hose_mj.tasks.tiny",
+        "MazeSettings",
+        "make_maze",
+        "one robot among the walls of Table 5.1",
+    ),
+}
+
+
+def make_task(id: str, **settings: Any) -> Task:
+    """Makes a task.
+
+    Args:
+        id: a key of `TASKS`.
+        settings: options of the task, the fields of its settings class.
+
+    Raises:
+        InputError: an unknown id or option, or a value outside its valid set.
+    """
+    if id not in TASKS:
+        raise InputError("task", id, "one of " + ", ".join(TASKS))
+    entry = TASKS[id]
+    module = importlib.import_module(entry.module)
+    kind = getattr(module, entry.settings)
+    options = [f.name for f in dataclasses.fields(kind) if f.name not in entry.presets]
+    for name in settings:
+        if name not in options:
+            raise InputError(f"option of {id}", name, "one of " + ", ".join(options))
+    made = kind(**{**entry.defaults, **settings, **entry.presets})
+    task = getattr(module, entry.factory)(made)
+    return cast("Task", dataclasses.replace(task, id=id))

@@ -1,0 +1,104 @@
+"""`Task`: a grid or physics task as data, with the record that selects its compiled functions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Literal
+
+import numpy as np
+
+from hose_mj.tasks import kernels
+from hose_mj.tasks.kernels import Floats, Integers, Projection
+from hose_mj.tasks.stream import Stream
+from hose_mj.tasks.variables import Variable, make_projection
+
+Schedule = Literal["turns", "single"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Task:
+    """A task: names for everything, and the record of its rules.
+
+    The rules themselves are the functions of `hose_mj.tasks.kernels`, called with `kernel`.
+
+    Attributes:
+        id: its name in the registry.
+        agents: names of the agents, in the order of their turns.
+        action_names: actions of each agent, by number.
+        variables: state variables, in the order in which `kernels.observe` writes them.
+        rewards: names of the reward signals, in the order of `kernels.compute_rewards`.
+        events: names of the events; event k is bit k of an event set.
+        schedule: "turns" (the agents move one after the other, or jointly) or "single".
+        settings: the frozen dataclass of all options that the task was made with.
+        kernel: the record whose type selects the code; its fields are listed in `kernels`.
+        layout: the parts of the state after its header, by name.
+        state_size: length of the state.
+    """
+
+    id: str
+    agents: tuple[str, ...]
+    action_names: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    rewards: tuple[str, ...]
+    events: tuple[str, ...]
+    schedule: Schedule
+    settings: Any
+    kernel: Any
+    layout: Mapping[str, slice]
+    state_size: int
+
+    @property
+    def n_agents(self) -> int:
+        """Number of agents."""
+        return len(self.agents)
+
+    @property
+    def n_actions(self) -> int:
+        """Number of actions of each agent."""
+        return len(self.action_names)
+
+    @property
+    def step_limit(self) -> int:
+        """Moves of single agents after which an episode is cut off."""
+        return int(self.kernel.step_limit)
+
+    def name_events(self, events: int) -> tuple[str, ...]:
+        """Returns the names of the events in a set."""
+        return tuple(name for bit, name in enumerate(self.events) if events >> bit & 1)
+
+    def make_state(self) -> Integers:
+        """Makes a state of zeros, to be written by a reset."""
+        return np.zeros(self.state_size, np.int64)
+
+    def reset(self, stream: Stream) -> Integers:
+        """Makes an initial state."""
+        state = self.make_state()
+        kernels.reset(self.kernel, state, stream)
+        return state
+
+    def observe(self, state: Integers, agent: int) -> Integers:
+        """Returns the values of all variables as the agent sees them (n_variables,)."""
+        values = np.zeros(len(self.variables), np.int64)
+        kernels.observe(self.kernel, state, agent, values)
+        return values
+
+    def make_projection(self, names: Iterable[str]) -> Projection:
+        """Makes the projection onto the named variables; `InputError` for a wrong name."""
+        return make_projection(self.variables, names)
+
+
+def make_reward_table(
+    events: tuple[str, ...], rewards: Mapping[str, Mapping[str, float]]
+) -> Floats:
+    """Makes the reward of every set of events, by signal (2^n_events, n_signals).
+
+    Args:
+        events: names of the events, bit 0 first.
+        rewards: for each signal, what an event is worth; an event that is not named is worth 0,
+            and the reward of a set is the sum over its events.
+    """
+    values = np.array([[worth.get(name, 0.0) for worth in rewards.values()] for name in events])
+    sets = np.array([bits[::-1] for bits in product((0.0, 1.0), repeat=len(events))])
+    return np.ascontiguousarray(sets @ values)

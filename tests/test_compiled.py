@@ -1,0 +1,34 @@
+import subprocess
+import sys
+
+from hose_mj import compiled
+
+LOWER = "from hose_mj.compiled import kernel\n\n@kernel\ndef lower(x):\n    return x + {}\n"
+UPPER = """from hose_mj.compiled import kernel
+from hose_mj.part.lower import lower
+
+@kernel
+def upper(x):
+    return 10.0 * lower(x)
+"""
+
+
+def test_a_change_in_an_inlined_kernel_of_another_file_is_noticed(tmp_path):
+    # A copy of compiled.py in a package of its own, so that its root is this folder.
+    package = tmp_path / "hose_mj"
+    for folder in (package, package / "part", package / "tasks"):
+        folder.mkdir()
+        (folder / "__init__.py").touch()
+    source = (compiled._ROOT / "hose_mj" / "compiled.py").read_text(encoding="utf-8")
+    (package / "compiled.py").write_text(source, encoding="utf-8")
+    (package / "part" / "upper.py").write_text(UPPER, encoding="utf-8")
+    program = "from hose_mj.part.upper import upper; print(upper(1.0), upper.stats.cache_hits)"
+    said = []
+    for number in (1, 1, 2, 1):
+        (package / "part" / "lower.py").write_text(LOWER.format(number), encoding="utf-8")
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        said.append(done.stdout.split(" ", 1))
+    assert [answer for answer, _ in said] == ["20.0", "20.0", "30.0", "20.0"]
+    # Both versions stay on the disk, so going back costs nothing.
+    assert [("float64" in hits) for _, hits in said] == [False, True, False, True]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.hoses.geds import solver
+from hose_mj.hoses.geds.contact import Contact
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.model import Array
@@ -19,14 +20,16 @@ class LoadSet:
     Args:
         spline: the hose's geometry.
         weight: generalised force of gravity on the control points, flat (n d,), N.
+        contact: what may be touched; `set_contact` replaces it.
 
     Attributes:
         loads: what the kernels read; made anew by every change.
     """
 
-    def __init__(self, spline: Spline, weight: Array) -> None:
+    def __init__(self, spline: Spline, weight: Array, contact: Contact) -> None:
         self._spline = spline
         self._weight = weight
+        self._contact = contact
         self.clear()
 
     def clear(self) -> None:
@@ -34,6 +37,11 @@ class LoadSet:
         self._forces: list[tuple[float, Array]] = []
         self._moments: list[tuple[float, Array]] = []
         self._rebuild()
+
+    def set_contact(self, contact: Contact) -> None:
+        """Replaces what may be touched."""
+        self._contact = contact
+        self.loads = self.loads._replace(contact=contact)
 
     def add_force(self, arc_length: float, force: ArrayLike) -> None:
         """Adds a point force (3,) N, world frame: f N_i(s) on control point i (thesis A.27).
@@ -89,4 +97,4 @@ class LoadSet:
             else:
                 moments[k, 0] = vector @ self._spline.normal
         slopes = np.ascontiguousarray(values[:, 1])
-        self.loads = solver.Loads(force, starts, slopes, moments)
+        self.loads = solver.Loads(force, starts, slopes, moments, self._contact)

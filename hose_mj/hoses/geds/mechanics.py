@@ -10,10 +10,12 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, schemes, solver
 from hose_mj.hoses.geds.compiled import compile_notice
+from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
 
 MOST_LOAD_STEPS = 64
+_ENDLESS = float(np.finfo(np.float64).max)
 _STATIC_TOLERANCE = 1e-10
 _STATIC_ITERATIONS = 400
 _STATIC_TURN = 0.5
@@ -121,9 +123,9 @@ def build_tangent(
     v: Array,
     work: solver.Work,
 ) -> None:
-    """Writes dU + C v less the point moments to work.gradient, its derivative by x to work.band.
+    """Writes dU + C v less moments and contact to work.gradient, its derivative to work.band.
 
-    Forces, gravity, inertia and holds are left out; so is the derivative of the damping.
+    Forces, gravity, inertia and holds are left out; so is the derivative of damping and friction.
     """
     work.gradient[:] = 0.0
     work.band[:] = 0.0
@@ -134,6 +136,11 @@ def build_tangent(
         *(work.span, work.gradient, work.band),
     )
     run_kernel(solver.add_moments, axes, loads, True, x, work)
+    # Within a step without end nothing changes its velocity, but what slides still rubs.
+    run_kernel(
+        *(add_contact, axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
+        *(work.gradient, work.band),
+    )
 
 
 def make_dense(band: Array, size: int, width: int) -> Array:

@@ -14,18 +14,21 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds import mechanics, schemes, solver
 from hose_mj.hoses.geds.body import SplineBody
+from hose_mj.hoses.geds.contact_set import ContactSet
 from hose_mj.hoses.geds.holds import HoldSet
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.touching import Touching
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.model import Array, Curve, Hold, Linearization, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 
-class GedsHose(SplineBody):
+class GedsHose(Touching, SplineBody):
     """Geometrically Exact Dynamic Splines (thesis appendix A) with an implicit integrator.
 
-    Queries (position, tension, energies, ...) are those of `SplineBody`.
+    Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact forces
+    those of `Touching`.
 
     Args:
         spec: the hose.
@@ -70,7 +73,8 @@ class GedsHose(SplineBody):
         self._timestep = float(timestep)
         self._limits = solver.Limits(tolerance * spec.length, max_iterations, np.inf, False, 0.0)
         self._holds = HoldSet(self._spline)
-        self._loads = LoadSet(self._spline, self._weight)
+        self._contacts = ContactSet(self._spline, spec, self.gravity, self._timestep)
+        self._loads = LoadSet(self._spline, self._weight, self._contacts.contact)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
 
     # -- state -----------------------------------------------------------------------------------
@@ -120,6 +124,7 @@ class GedsHose(SplineBody):
             "steps": self._steps,
             "holds": self._holds.snapshot(),
             "loads": self._loads.snapshot(),
+            "contacts": self._contacts.snapshot(),
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
         }
@@ -139,6 +144,8 @@ class GedsHose(SplineBody):
         self._steps = state["steps"]
         self.iterations, self.fallbacks = state["iterations"], state["fallbacks"]
         self._loads.restore(state["loads"])
+        self._contacts.restore(state["contacts"])
+        self._loads.set_contact(self._contacts.contact)
         self._holds.restore(state["holds"], self._state.x)
         self._renew_work()
 
@@ -285,6 +292,8 @@ class GedsHose(SplineBody):
 
     def _start(self) -> None:
         self._steps = 0
+        self._contacts.rebuild()
+        self._loads.set_contact(self._contacts.contact)
         self._loads.clear()
         self._holds.clear(self._state.x)
         self._renew_work()

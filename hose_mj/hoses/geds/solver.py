@@ -20,6 +20,7 @@ import numpy as np
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.basis import Tables
 from hose_mj.hoses.geds.compiled import compiled, kernel
+from hose_mj.hoses.geds.contact import TOLERANCE, Contact, add_contact
 from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
 from hose_mj.hoses.model import Array
 
@@ -61,19 +62,21 @@ class Holds(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Dead loads.
+    """Dead loads, and what may be touched.
 
     Attributes:
         force: generalised force on the control points, gravity included, flat (n d,).
         moment_start: index of the first of the 4 d unknowns at each point moment, (k,).
         moment_basis: dN/ds there, (k, 4).
         moment: (k, 3) N m; a planar hose reads the first entry.
+        contact: obstacles; see contact.py.
     """
 
     force: Array
     moment_start: np.ndarray
     moment_basis: Array
     moment: Array
+    contact: Contact
 
 
 class Limits(NamedTuple):
@@ -208,7 +211,10 @@ def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
 
 @kernel
 def build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
-    """Fills work.gradient with the residual without holds, work.band with its derivative."""
+    """Fills work.gradient with the residual without holds, work.band with its derivative.
+
+    Returns how many contact points touch something.
+    """
     h, X, V = stage
     size = len(x)
     for k in range(size):
@@ -237,6 +243,10 @@ def build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-u
     )
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
+    contact = loads.contact
+    if contact.geoms.shape[0] + contact.given.shape[0] == 0:
+        return 0
+    return add_contact(axes, contact, x, work.rate, V, h, exact, work.gradient, work.band)
 
 
 @kernel
@@ -385,7 +395,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
     slope = 0.0
     iteration = 1
     while True:
-        build(axes, hose, stage, loads, scale, exact, x, work)
+        touching = build(axes, hose, stage, loads, scale, exact, x, work)
         # Holds not yet met come first: the line search starts from a point that meets them.
         if limits.line_search and exact and iteration > 2 and shortened < 12:
             turned = 0.0
@@ -424,7 +434,10 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
                 factor = limits.rotation_cap / turn
         for k in range(size):
             x[k] += factor * work.step[k]
-        if factor == 1.0 and largest <= limits.tolerance:
+        tolerance = limits.tolerance
+        if touching > 0:
+            tolerance = min(tolerance, loads.contact.law[TOLERANCE])
+        if factor == 1.0 and largest <= tolerance:
             return DONE, iteration, fallbacks
         if iteration == limits.max_iterations:
             return NOT_CONVERGED, iteration, fallbacks

@@ -1,0 +1,201 @@
+"""`ContactSet`: the obstacles of one hose and the contact law, as the kernels read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import basis, contact, mechanics, shapes
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.model import Array, Reaction
+from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
+from hose_mj.hoses.spec import HoseSpec
+
+_CODES = {
+    "plane": shapes.PLANE,
+    "sphere": shapes.SPHERE,
+    "capsule": shapes.CAPSULE,
+    "cylinder": shapes.CYLINDER,
+    "box": shapes.BOX,
+}
+TIGHTER = 0.1
+"""While something touches, Newton goes on until moves are below this part of the law's width, and
+of the way that the slip speed goes in a step."""
+
+
+class ContactSet:
+    """What one hose may touch.
+
+    Args:
+        spline: the hose's geometry.
+        spec: the hose.
+        gravity: (3,) m/s^2, for the default stiffness.
+        timestep: s, for the tolerance.
+
+    Attributes:
+        contact: what the kernels read; made anew by every change.
+        obstacles: the shapes, in the order of their numbers.
+        law: as given.
+        arc_lengths: where contact is looked for, (Q,), m.
+    """
+
+    def __init__(self, spline: Spline, spec: HoseSpec, gravity: Array, timestep: float) -> None:
+        self._spline, self._spec, self._timestep = spline, spec, timestep
+        self._pull = max(9.81, float(np.linalg.norm(gravity)))
+        # The hose's coordinates first: a reflection where that is an odd permutation.
+        rest = [c for c in range(3) if c not in spline.dims]
+        self._order = [*spline.dims, *rest]
+        self._parity = float(np.linalg.det(np.eye(3)[self._order]))
+        self.set((), ContactLaw())
+
+    def set(self, obstacles: Sequence[Obstacle], law: ContactLaw) -> None:
+        """Replaces obstacles and law; drops distances handed in."""
+        for obstacle in obstacles:
+            if not isinstance(obstacle, Obstacle):
+                raise InputError("obstacles", obstacle, "records of the class Obstacle")
+        self.obstacles, self.law = tuple(obstacles), law
+        self._given = np.zeros((0, contact.GIVEN))
+        self._numbers = self._make_law()
+        self.arc_lengths, self._points = self._make_points()
+        self.rebuild()
+
+    def move(self, number: int, changes: dict[str, Any]) -> None:
+        """Replaces placement or velocities of one obstacle; None leaves a thing as it is."""
+        check_count("obstacle", number, 0, len(self.obstacles) - 1)
+        wanted = {name: value for name, value in changes.items() if value is not None}
+        moved = replace(self.obstacles[number], **wanted)
+        self.obstacles = (*self.obstacles[:number], moved, *self.obstacles[number + 1 :])
+        self.contact.geoms[number] = self._make_row(moved)
+
+    def set_distances(
+        self, distances: ArrayLike, normals: ArrayLike, friction: ArrayLike, velocity: ArrayLike, x: Array
+    ) -> None:
+        """Hands in the nearest surface at each contact point, see `Touching.set_distances`."""
+        q = len(self.arc_lengths)
+        given = np.zeros((q, contact.GIVEN))
+        turned = np.asarray(normals, dtype=np.float64)
+        speeds = np.asarray(velocity, dtype=np.float64)
+        try:
+            given[:, 0] = distances
+            given[:, 1:4] = turned[..., self._order]
+            given[:, 4] = friction
+            given[:, 5:8] = speeds[..., self._order]
+        except (TypeError, ValueError, IndexError):
+            valid = f"distances ({q},), normals and velocities ({q}, 3), friction ({q},)"
+            raise InputError("shapes of the distances", np.shape(distances), valid) from None
+        if not np.all(np.isfinite(given)) or np.any(given[:, 4] < 0.0):
+            raise InputError("distances", distances, "finite numbers, friction at or above 0")
+        place = self._spline.evaluate(self.arc_lengths, x)
+        given[:, 8:11] = place[:, self._order]
+        self._given = given
+        self.rebuild()
+
+    def drop_distances(self) -> None:
+        """Forgets distances handed in."""
+        self._given = np.zeros((0, contact.GIVEN))
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Makes what the kernels read; to be called where the plane of the hose has moved."""
+        geoms = np.zeros((len(self.obstacles), shapes.ROW))
+        for row, obstacle in zip(geoms, self.obstacles, strict=True):
+            row[:] = self._make_row(obstacle)
+        self.contact = contact.Contact(self._points, geoms, self._given, self._numbers)
+
+    # -- forces ----------------------------------------------------------------------------------
+
+    def compute_forces(self, x: Array, v: Array) -> tuple[Array, Array]:
+        """Returns forces on the hose (Q, 3) and on the geoms (G, 6) in the hose's coordinates."""
+        forces = np.zeros((len(self._points), 3))
+        reactions = np.zeros((len(self.obstacles), 6))
+        mechanics.run_kernel(
+            *(contact.compute_forces, self._spline.axes, self.contact, x, v, forces, reactions)
+        )
+        return forces, reactions
+
+    def compute_world_forces(self, x: Array, v: Array) -> Array:
+        """Returns the forces on the hose at the contact points (Q, 3), N, world frame."""
+        return self._to_world(self.compute_forces(x, v)[0])
+
+    def compute_reactions(self, x: Array, v: Array) -> list[Reaction]:
+        """Returns what the hose does to each obstacle, moments about the obstacle's position."""
+        found = self.compute_forces(x, v)[1]
+        forces = self._to_world(found[:, :3])
+        moments = self._parity * self._to_world(found[:, 3:])
+        return [Reaction(f, m) for f, m in zip(forces, moments, strict=True)]
+
+    # -- state -----------------------------------------------------------------------------------
+
+    def snapshot(self) -> dict[str, Any]:
+        """All of it as arrays, plain numbers and containers of them."""
+        return {
+            "obstacles": [
+                {f.name: _copy(getattr(one, f.name)) for f in fields(one)} for one in self.obstacles
+            ],
+            "law": asdict(self.law),
+            "given": self._given.copy(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot."""
+        self.set([Obstacle(**one) for one in state["obstacles"]], ContactLaw(**state["law"]))
+        self._given = state["given"].copy()
+        self.rebuild()
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _make_law(self) -> Array:
+        law, spec = self.law, self._spec
+        weight = spec.linear_density * self._pull
+        k = weight / (SINK * spec.radius) if law.stiffness is None else law.stiffness
+        width = weight / k if law.width is None else law.width
+        damping = law.damping_time
+        if damping is None:
+            damping = 2.0 * np.sqrt(spec.linear_density / k)
+        numbers = np.zeros(6)
+        numbers[contact.STIFFNESS] = k
+        numbers[contact.WIDTH] = width
+        numbers[contact.DAMPING] = damping
+        numbers[contact.SLIP] = law.slip_speed
+        numbers[contact.RADIUS] = spec.radius
+        numbers[contact.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
+        return numbers
+
+    def _make_points(self) -> tuple[Array, Array]:
+        """Gauss points of every span: arc lengths (Q,) and basis values with weights (Q, 5)."""
+        n_spans = self._spline.n_control_points - basis.DEGREE
+        nodes, weights = np.polynomial.legendre.leggauss(self.law.points_per_span)
+        span = self._spline.length / n_spans
+        at = ((np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span).ravel()
+        _, values = basis.compute_basis(self._spline.knots, at)
+        share = np.tile(0.5 * span * weights, n_spans)
+        return at, np.column_stack([values[:, 0], share])
+
+    def _make_row(self, obstacle: Obstacle) -> Array:
+        order, row = self._order, np.zeros(shapes.ROW)
+        row[shapes.KIND] = _CODES[obstacle.kind]
+        row[shapes.FRICTION] = obstacle.friction
+        row[shapes.BOUND] = obstacle.find_bound()
+        row[shapes.SIZE : shapes.SIZE + 3] = obstacle.size
+        place = np.asarray(obstacle.position) - self._spline.offset
+        row[shapes.POSITION : shapes.POSITION + 3] = place[order]
+        row[shapes.ROTATION : shapes.ROTATION + 9] = np.asarray(obstacle.rotation)[order].ravel()
+        row[shapes.VELOCITY : shapes.VELOCITY + 3] = np.asarray(obstacle.velocity)[order]
+        spin = self._parity * np.asarray(obstacle.angular_velocity)[order]
+        row[shapes.SPIN : shapes.SPIN + 3] = spin
+        return row
+
+    def _to_world(self, rows: Array) -> Array:
+        world = np.zeros_like(rows)
+        world[:, self._order] = rows
+        return world
+
+
+def _copy(value: Any) -> Any:
+    return value.copy() if isinstance(value, np.ndarray) else value

@@ -102,7 +102,7 @@ class ContactLaw:
             raise InputError("points_per_span", self.points_per_span, "a whole number from 1 to 16")
 
 
-SINK = 0.01
+SINK = 0.003
 """Depth to which a hose sinks into a floor under its own weight, by its radius."""
 
 

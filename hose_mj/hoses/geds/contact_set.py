@@ -43,6 +43,7 @@ class ContactSet:
         obstacles: the shapes, in the order of their numbers.
         law: as given.
         arc_lengths: where contact is looked for, (Q,), m.
+        order: the world axes in the order of the hose's coordinates.
     """
 
     def __init__(self, spline: Spline, spec: HoseSpec, gravity: Array, timestep: float) -> None:
@@ -50,8 +51,8 @@ class ContactSet:
         self._pull = max(9.81, float(np.linalg.norm(gravity)))
         # The hose's coordinates first: a reflection where that is an odd permutation.
         rest = [c for c in range(3) if c not in spline.dims]
-        self._order = [*spline.dims, *rest]
-        self._parity = float(np.linalg.det(np.eye(3)[self._order]))
+        self.order = [*spline.dims, *rest]
+        self._parity = float(np.linalg.det(np.eye(3)[self.order]))
         self.set((), ContactLaw())
 
     def set(self, obstacles: Sequence[Obstacle], law: ContactLaw) -> None:
@@ -83,16 +84,16 @@ class ContactSet:
         speeds = np.asarray(velocity, dtype=np.float64)
         try:
             given[:, 0] = distances
-            given[:, 1:4] = turned[..., self._order]
+            given[:, 1:4] = turned[..., self.order]
             given[:, 4] = friction
-            given[:, 5:8] = speeds[..., self._order]
+            given[:, 5:8] = speeds[..., self.order]
         except (TypeError, ValueError, IndexError):
             valid = f"distances ({q},), normals and velocities ({q}, 3), friction ({q},)"
             raise InputError("shapes of the distances", np.shape(distances), valid) from None
         if not np.all(np.isfinite(given)) or np.any(given[:, 4] < 0.0):
             raise InputError("distances", distances, "finite numbers, friction at or above 0")
         place = self._spline.evaluate(self.arc_lengths, x)
-        given[:, 8:11] = place[:, self._order]
+        given[:, 8:11] = place[:, self.order]
         self._given = given
         self.rebuild()
 
@@ -178,7 +179,7 @@ class ContactSet:
         return at, np.column_stack([values[:, 0], share])
 
     def _make_row(self, obstacle: Obstacle) -> Array:
-        order, row = self._order, np.zeros(shapes.ROW)
+        order, row = self.order, np.zeros(shapes.ROW)
         row[shapes.KIND] = _CODES[obstacle.kind]
         row[shapes.FRICTION] = obstacle.friction
         row[shapes.BOUND] = obstacle.find_bound()
@@ -193,7 +194,7 @@ class ContactSet:
 
     def _to_world(self, rows: Array) -> Array:
         world = np.zeros_like(rows)
-        world[:, self._order] = rows
+        world[:, self.order] = rows
         return world
 
 

@@ -166,7 +166,9 @@ def _draw_motion(result: CaseResult, ratios: list[Ratio]) -> Pictures:
     }
     shown = choose_shown(result)
     curves, times = _pick_snapshots(shown)
-    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, times=times)
+    pictures[f"{case.id}-shapes"] = plots.plot_shapes(
+        case.title, curves, case.view, times
+    )
     if "geds" in shown and len(shown) > 1:
         pictures[f"{case.id}-distance"] = _draw_distance(shown)
     return pictures

@@ -221,8 +221,11 @@ class MujocoChainHose:
         not where a moment acts.
 
         Raises:
+            InputError: a chain with obstacles, which must come to rest by itself.
             StepError: no equilibrium was found; the state before is kept.
         """
+        if self.settings.obstacles:
+            raise InputError("obstacles", len(self.settings.obstacles), "none in a chain's statics")
         self._chain.settle(self._held, self._loads)
 
     def linearize(self) -> Linearization:

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import j0
 
 from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
 
 LENGTH = 1.0
@@ -53,6 +54,17 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Reference:
+    """The truth of a motion: probe values (k, q), and how far two resolutions of it still differ.
+
+    `uncertainty` is a fraction of L.
+    """
+
+    values: Array
+    uncertainty: float
+
+
+@dataclass(frozen=True)
 class Case:
     """One case.
 
@@ -71,6 +83,16 @@ class Case:
         clamped: True where one end is clamped, so that a chain's clamp can be corrected.
         models: the models that the case is run with.
         steps: time steps of GEDS (s), coarse to fine; dynamic cases only.
+        obstacles: what the hose may touch.
+        contact_law: of GEDS; None for its defaults.
+        plane: of GEDS where it is also run in a plane; None for a motion in space alone.
+        view: the two world axes that pictures show, horizontal first.
+        reference: computes the motion's truth where that is not the converged limit of GEDS.
+        uncertainty: how far two resolutions of the reference may differ, of L.
+        promise: error that GEDS keeps: in statics with 20 control points; in motions, None for
+            no promise, with its finest setting.
+        has_ratios: False where models do not converge to the same motion, so that costs at equal
+            error mean nothing.
     """
 
     id: str
@@ -87,6 +109,14 @@ class Case:
     clamped: bool = False
     models: tuple[str, ...] = ("geds", "cable", "hinge-chain")
     steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
+    obstacles: tuple[Obstacle, ...] = ()
+    contact_law: ContactLaw | None = None
+    plane: str | None = "xz"
+    view: tuple[int, int] = (0, 2)
+    reference: Callable[[], Reference] | None = None
+    uncertainty: float = 1e-4
+    promise: float | None = None
+    has_ratios: bool = True
 
 
 def lay_straight(hose: HoseModel) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hose_mj.errors import StepError
 from hose_mj.hoses.model import Array, Hold, HoseModel
-from hose_mj.validation.case import STIFFENING, Case, Motion
+from hose_mj.validation.case import STIFFENING, Case, Motion, Reference
 from hose_mj.validation.settings import (
     MOST_UNSTABLE,
     STAGNATION,
@@ -93,14 +93,6 @@ class Skipped:
         return {"case": self.case, "setting": self.setting.label, "why": self.why}
 
 
-@dataclass(frozen=True)
-class Reference:
-    """Converged motion: probe values (k, q), and how far two resolutions of it still differ."""
-
-    values: Array
-    uncertainty: float
-
-
 def run_static(case: Case, models: tuple[str, ...], grid: Grid) -> list[Outcome]:
     """Runs a static case with every setting of the grid."""
     assert case.truth is not None
@@ -154,7 +146,7 @@ def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
 
 
 def compute_reference(case: Case, grid: Grid, *, stretchable: bool) -> Reference:
-    """The converged limit of a motion: GEDS, fine in n, extrapolated in the time step.
+    """A motion's own reference, or its converged limit: GEDS, fine in n, extrapolated in the step.
 
     Args:
         case: a dynamic case.
@@ -163,6 +155,8 @@ def compute_reference(case: Case, grid: Grid, *, stretchable: bool) -> Reference
     """
     motion = case.motion
     assert motion is not None
+    if case.reference is not None:
+        return case.reference()
     spec = case.spec
     if not stretchable:
         spec = replace(spec, axial_stiffness=STIFFENING * spec.axial_stiffness)

@@ -60,15 +60,19 @@ class Setting:
         scheme = self.scheme.removesuffix(", planar")
         options.update(gravity=case.gravity, timestep=self.timestep or 0.005)
         if self.model == "geds":
-            options.update(control_points=self.resolution, plane="xz" if self.planar else None)
+            options.update(control_points=self.resolution, plane=case.plane if self.planar else None)
             options.setdefault("scheme", "bdf2" if self.timestep is None else scheme)
         else:
             options.update(segments=self.resolution, clamp_correction=bool(self.clamp_corrected))
             if self.timestep is not None:
                 options.update(integrator=scheme)
-        if self.model == "cable" and self.timestep is not None:
+        if self.model == "cable" and self.timestep is not None and case.plane is not None:
             # In a plane nothing twists: less torsional stiffness allows the cable larger steps.
             options.update(torsional_stiffness=CABLE_TWIST * case.spec.bending_stiffness)
+        if case.obstacles:
+            options.update(obstacles=case.obstacles)
+            if self.model == "geds":
+                options.update(contact_law=case.contact_law)
         return make_hose(self.model, case.spec, **options)
 
 
@@ -161,7 +165,7 @@ def list_ladders(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[li
     driven = case.motion is not None and case.motion.drive is not None
     for model in models:
         for scheme in grid.schemes[model]:
-            if scheme == "rk4" and driven:
+            if (scheme == "rk4" and driven) or (case.plane is None and scheme.endswith(", planar")):
                 continue
             for resolution in grid.dynamic[model]:
                 for corrected in _clamps(model, case):

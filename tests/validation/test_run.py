@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hose_mj.validation.case import Reference
 from hose_mj.validation.compare import (
     EQUAL_ERRORS,
     check_motions,
@@ -18,7 +19,6 @@ from hose_mj.validation.compare import (
 )
 from hose_mj.validation.run import (
     LOST,
-    Reference,
     compute_reference,
     run_ladder,
     run_static,

@@ -6,6 +6,7 @@ on it, mechanics.py how the kernels are called.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.touching import Touching
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.model import Array, Curve, Hold, Linearization, Reaction
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 
@@ -41,6 +43,8 @@ class GedsHose(Touching, SplineBody):
         tolerance: Newton goes on while it moves a control point by more than this fraction of L;
             with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
         max_iterations: Newton iterations in a stage before the careful fallback.
+        obstacles: what the hose may touch; `set_obstacles` changes it.
+        contact_law: numbers of the contact; None for the defaults.
 
     Attributes:
         spec, gravity, scheme: as given.
@@ -62,6 +66,8 @@ class GedsHose(Touching, SplineBody):
         scheme: str = "bdf2",
         tolerance: float = 2e-4,
         max_iterations: int = 20,
+        obstacles: Sequence[Obstacle] = (),
+        contact_law: ContactLaw | None = None,
     ) -> None:
         check_number("timestep", timestep)
         check_number("tolerance", tolerance)
@@ -75,6 +81,8 @@ class GedsHose(Touching, SplineBody):
         self._holds = HoldSet(self._spline)
         self._contacts = ContactSet(self._spline, spec, self.gravity, self._timestep)
         self._loads = LoadSet(self._spline, self._weight, self._contacts.contact)
+        if len(obstacles) > 0:
+            self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
 
     # -- state -----------------------------------------------------------------------------------

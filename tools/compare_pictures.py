@@ -10,6 +10,7 @@ import numpy as np
 from hose_mj.recording import plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import Outcome
+from tools.compare_obstacles import find_outlines
 from tools.compare_study import Study
 
 Pictures = dict[str, bytes]
@@ -80,7 +81,8 @@ def describe_setting(outcome: Outcome) -> str:
     """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
     setting = outcome.setting
     size = "control points" if setting.model == "geds" else "segments"
-    return f"{setting.model}, {setting.resolution} {size}, {name_setting(outcome).split(', ')[-1]}"
+    step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
+    return f"{setting.model}, {setting.resolution} {size}{step}"
 
 
 def name_series(outcome: Outcome) -> str:
@@ -166,8 +168,9 @@ def _draw_motion(result: CaseResult, ratios: list[Ratio]) -> Pictures:
     }
     shown = choose_shown(result)
     curves, times = _pick_snapshots(shown)
+    outlines = find_outlines(case.obstacles, case.view)
     pictures[f"{case.id}-shapes"] = plots.plot_shapes(
-        case.title, curves, case.view, times
+        case.title, curves, case.view, times, outlines
     )
     if "geds" in shown and len(shown) > 1:
         pictures[f"{case.id}-distance"] = _draw_distance(shown)
@@ -206,6 +209,14 @@ def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
     title = members[0].case.title if len(members) == 1 else family.replace("-", " ").capitalize()
     of = "reference" if members[0].case.scale is None else "length"
     pictures = {family: plots.plot_errors(title, points, f"error (of the {of})")}
+    case = members[0].case
+    if case.obstacles:
+        ours = max(members[0].outcomes, key=lambda outcome: outcome.setting.resolution)
+        curves = {describe_setting(ours): ours.points[0]}
+        outlines = find_outlines(case.obstacles, case.view)
+        pictures[f"{family}-shapes"] = plots.plot_shapes(
+            title, curves, case.view, outlines=outlines
+        )
     if family in FANS and len(members) > 1:
         fans = [_make_fan(members, "geds", None), _make_fan(members, "cable", False)]
         pictures[f"{family}-shapes"] = plots.plot_fan(title, [fan for fan in fans if fan])

@@ -91,7 +91,8 @@ def run_case(
         result.outcomes += outcomes
         result.skipped += skipped
     advance("timing")
-    time_rounds(case, result.outcomes, grid)
+    if case.has_ratios:
+        time_rounds(case, result.outcomes, grid)
     result.limit_gap = compute_limit_gap(result)
     return result
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from hose_mj.hoses.model import Array, Hold, HoseModel
 from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
@@ -96,13 +97,18 @@ _TOWED = HoseSpec(
 )
 
 
-def find_tow(fraction: Array) -> Array:
-    """Places (k, 2) of the towed end after fractions (k,) of a figure of eight, even in speed."""
+@cache
+def _make_eight() -> CubicSpline:
+    """The figure of eight over the fraction of its length, starting at the far end of the hose."""
     turn = np.linspace(0.0, 2.0 * math.pi, 4001)
     eight = np.stack([np.sin(turn), 0.5 * np.sin(2.0 * turn)], axis=1) * _TOW_WIDTH
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(eight, axis=0), axis=1))])
-    places = [np.interp(fraction * along[-1], along, eight[:, c]) for c in range(2)]
-    return np.stack(places, axis=-1) + [LENGTH, 0.0]
+    return CubicSpline(along / along[-1], eight + [LENGTH, 0.0])
+
+
+def find_tow(fraction: Array) -> Array:
+    """Places (k, 2) of the towed end after fractions (k,) of a figure of eight, even in speed."""
+    return np.asarray(_make_eight()(fraction))
 
 
 def _tow_chain(n_links: int, n_increments: int) -> Array:
@@ -154,7 +160,7 @@ def make_floor_tow() -> Case:
         scale=LENGTH,
         motion=Motion(TOW_TIME, TOW_SAMPLES, drive),
         models=("geds", "cable"),
-        steps=(0.1, 0.05, 0.02),
+        steps=(0.1, 0.05),
         obstacles=(Obstacle(kind="plane", friction=TOW_FRICTION),),
         contact_law=ContactLaw(slip_speed=3e-5),
         plane=None,

@@ -170,8 +170,8 @@ def compute_reference(case: Case, grid: Grid, *, stretchable: bool) -> Reference
             runs.append(simulate(case, setting.make(case, tolerance=1e-7))[1])
         return np.asarray((4.0 * runs[1] - runs[0]) / 3.0)
 
-    # Damped and driven motions are smooth in time; the free ones ring.
-    parts = grid.reference_steps[motion.drive is not None] // 2
+    # Damped motions are smooth in time; the free ones ring.
+    parts = grid.reference_steps[case.spec.damping_time > 0.0] // 2
     fine = extrapolate(REFERENCE_POINTS, parts)
     coarse = extrapolate(3 * REFERENCE_POINTS // 4, parts // 2)
     assert case.scale is not None

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_choice, check_vector
+from hose_mj.hoses.inputs import check_choice, check_count, check_vector
 from hose_mj.hoses.model import Array
 from hose_mj.hoses.spec import check_number
 
@@ -79,7 +79,10 @@ class ContactLaw:
         damping_time: the normal force grows by this times its slope times the closing speed (s),
             and never pulls; by default critical, 2 sqrt(linear density / k).
         slip_speed: m/s.
-        points_per_span: contact is looked for at so many points in each span of the spline.
+        points_per_span: contact is looked for at so many points in each span of the spline; None
+            for 3, with self-contact for as many as bring them within a radius of each other.
+        self_contact: whether the hose may touch itself, without friction; its stiffness is tied to
+            the time step dt: linear density / (4 dt^2), see geds/self_contact.py.
 
     Raises:
         InputError: a value outside its range.
@@ -89,7 +92,8 @@ class ContactLaw:
     width: float | None = None
     damping_time: float | None = None
     slip_speed: float = 1e-3
-    points_per_span: int = 3
+    points_per_span: int | None = None
+    self_contact: bool = False
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "width"):
@@ -98,12 +102,14 @@ class ContactLaw:
         if self.damping_time is not None:
             check_number("contact damping_time", self.damping_time, may_be_zero=True)
         check_number("slip_speed", self.slip_speed)
-        if self.points_per_span not in range(1, 17):
-            raise InputError("points_per_span", self.points_per_span, "a whole number from 1 to 16")
+        if self.points_per_span is not None:
+            check_count("points_per_span", self.points_per_span, 1, MOST_POINTS)
 
 
 SINK = 0.003
 """Depth to which a hose sinks into a floor under its own weight, by its radius."""
+MOST_POINTS = 16
+"""Contact points in a span at most."""
 
 
 def _freeze(array: Array) -> Array:

@@ -23,7 +23,7 @@ from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.shapes import FRICTION, POSITION, SPIN, VELOCITY, is_near, measure
 from hose_mj.hoses.model import Array
 
-STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE = range(6)
+STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE, SELF_STIFFNESS, SELF_DAMPING = range(8)
 """Places in `Contact.law`."""
 GIVEN = 11
 """Columns of a distance handed in: distance, normal (3), friction, surface velocity (3) and the
@@ -39,17 +39,21 @@ class Contact(NamedTuple):
             (Q, 5), span after span, equally many in each.
         geoms: one row a shape, see shapes.py, (G, 24).
         given: distances handed in, one row a contact point, (Q, 11); (0, 11) for none.
-        law: numbers of the contact law, (6,).
+        law: numbers of the contact law, (8,); no self-contact where its stiffness is 0.
+        arcs: rest arc lengths of the contact points, (Q,), m.
+        room: work space, (Q + S, 4).
     """
 
     points: Array
     geoms: Array
     given: Array
     law: Array
+    arcs: Array
+    room: Array
 
 
 @kernel
-def _evaluate(axes, points, q, start, x):  # type: ignore[no-untyped-def]
+def evaluate(axes, points, q, start, x):  # type: ignore[no-untyped-def]
     """sum_i N_i x_i at contact point q as three coordinates; a planar hose's last is 0."""
     d = len(axes)
     n0, n1, n2, n3 = points[q, 0], points[q, 1], points[q, 2], points[q, 3]
@@ -78,6 +82,15 @@ def _find_surface_velocity(geoms, g, point):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def make_push(width, gap):  # type: ignore[no-untyped-def]
+    """The ramp S of a gap (m) and its slope by the depth."""
+    depth = max(width - gap, 0.0)
+    if depth < 2.0 * width:
+        return depth * depth / (4.0 * width), depth / (2.0 * width)
+    return depth - width, 1.0
+
+
+@kernel
 def compute_force(law, gap, normal, friction, velocity):  # type: ignore[no-untyped-def]
     """Force per length on the hose.
 
@@ -92,13 +105,7 @@ def compute_force(law, gap, normal, friction, velocity):  # type: ignore[no-unty
         force (3,), normal force N, its slope by the depth at rest (N/m^2), slip v = u_t / s (3,)
         and s (m/s).
     """
-    width = law[WIDTH]
-    depth = max(width - gap, 0.0)
-    push = depth - width
-    slope = 1.0
-    if depth < 2.0 * width:
-        push = depth * depth / (4.0 * width)
-        slope = depth / (2.0 * width)
+    push, slope = make_push(law[WIDTH], gap)
     u = velocity
     away = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
     N = law[STIFFNESS] * max(push - law[DAMPING] * slope * away, 0.0)
@@ -122,7 +129,7 @@ def find_gap(axes, contact, q, g, start, x):  # type: ignore[no-untyped-def]
 
     Geom -1 stands for the distances handed in: planes through the points nearest then.
     """
-    point = _evaluate(axes, contact.points, q, start, x)
+    point = evaluate(axes, contact.points, q, start, x)
     if g < 0:
         row = contact.given
         normal = (row[q, 1], row[q, 2], row[q, 3])
@@ -199,7 +206,7 @@ def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):  # t
                 gap, normal, bend, friction, surface = find_gap(axes, contact, q, g, start, x)
                 if gap >= contact.law[WIDTH]:
                     continue
-                velocity = _evaluate(axes, contact.points, q, start, rate)
+                velocity = evaluate(axes, contact.points, q, start, rate)
                 if step == np.inf:
                     velocity = surface
                 relative = _relate(velocity, surface)
@@ -209,19 +216,31 @@ def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):  # t
                 if N == 0.0:
                     continue
                 touching += 1
-                matrix = _press(normal, slope * (1.0 + contact.law[DAMPING] / step))
+                matrix = press(normal, slope * (1.0 + contact.law[DAMPING] / step))
                 if exact:
                     matrix = _soften(matrix, normal, bend, N)
                 if friction > 0.0 and step < np.inf:
-                    before = _relate(_evaluate(axes, contact.points, q, start, base), surface)
+                    before = _relate(evaluate(axes, contact.points, q, start, base), surface)
                     _, _, _, usual, _ = compute_force(contact.law, gap, normal, friction, before)
                     matrix = _rub(matrix, normal, slip, usual, friction * N / (step * s))
-                _scatter(axes, contact.points, q, start, force, matrix, gradient, band)
+                share = contact.points[q, 4]
+                force, matrix = _scale3(share, force), _scale6(share, matrix)
+                scatter(axes, contact.points, q, start, force, matrix, gradient, band)
     return touching
 
 
 @kernel
-def _press(n, stiffness):  # type: ignore[no-untyped-def]
+def _scale3(c, v):  # type: ignore[no-untyped-def]
+    return c * v[0], c * v[1], c * v[2]
+
+
+@kernel
+def _scale6(c, m):  # type: ignore[no-untyped-def]
+    return c * m[0], c * m[1], c * m[2], c * m[3], c * m[4], c * m[5]
+
+
+@kernel
+def press(n, stiffness):  # type: ignore[no-untyped-def]
     """stiffness n n^T as (00, 11, 22, 01, 02, 12)."""
     return (
         stiffness * n[0] * n[0],
@@ -263,17 +282,16 @@ def _rub(m, n, v, w, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _scatter(axes, points, q, start, force, m, gradient, band):  # type: ignore[no-untyped-def]
-    """Adds a force per length and its stiffness m to the span's unknowns."""
+def scatter(axes, points, q, start, force, m, gradient, band):  # type: ignore[no-untyped-def]
+    """Adds a force at contact point q and its stiffness m to the span's unknowns."""
     d = len(axes)
     n_coordinates = min(d, 3)
     rows = ((m[0], m[3], m[4]), (m[3], m[1], m[5]), (m[4], m[5], m[2]))
     for i in range(4):
-        share = points[q, 4] * points[q, i]
         for c in range(n_coordinates):
-            gradient[start + i * d + c] -= share * force[c]
+            gradient[start + i * d + c] -= points[q, i] * force[c]
         for j in range(i + 1):
-            weight = share * points[q, j]
+            weight = points[q, i] * points[q, j]
             column = start + j * d
             for c1 in range(n_coordinates):
                 for c2 in range(n_coordinates if j < i else c1 + 1):
@@ -301,7 +319,7 @@ def compute_forces(axes, contact, x, v, forces, reactions):  # type: ignore[no-u
                 continue
             for q in range(e * per_span, (e + 1) * per_span):
                 gap, normal, _, friction, surface = find_gap(axes, contact, q, g, start, x)
-                velocity = _evaluate(axes, contact.points, q, start, v)
+                velocity = evaluate(axes, contact.points, q, start, v)
                 relative = _relate(velocity, surface)
                 force = compute_force(contact.law, gap, normal, friction, relative)[0]
                 weight = contact.points[q, 4]
@@ -309,7 +327,7 @@ def compute_forces(axes, contact, x, v, forces, reactions):  # type: ignore[no-u
                     forces[q, c] += weight * force[c]
                 if g < 0:
                     continue
-                point = _evaluate(axes, contact.points, q, start, x)
+                point = evaluate(axes, contact.points, q, start, x)
                 for c in range(3):
                     c1, c2 = (c + 1) % 3, (c + 2) % 3
                     arm1 = point[c1] - contact.geoms[g, POSITION + c1]

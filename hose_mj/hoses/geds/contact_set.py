@@ -14,7 +14,7 @@ from hose_mj.hoses.geds import basis, contact, mechanics, shapes
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.model import Array, Reaction
-from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
+from hose_mj.hoses.obstacles import MOST_POINTS, SINK, ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
 
 _CODES = {
@@ -107,7 +107,10 @@ class ContactSet:
         geoms = np.zeros((len(self.obstacles), shapes.ROW))
         for row, obstacle in zip(geoms, self.obstacles, strict=True):
             row[:] = self._make_row(obstacle)
-        self.contact = contact.Contact(self._points, geoms, self._given, self._numbers)
+        room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
+        self.contact = contact.Contact(
+            self._points, geoms, self._given, self._numbers, self.arc_lengths, room
+        )
 
     # -- forces ----------------------------------------------------------------------------------
 
@@ -159,20 +162,27 @@ class ContactSet:
         damping = law.damping_time
         if damping is None:
             damping = 2.0 * np.sqrt(spec.linear_density / k)
-        numbers = np.zeros(6)
+        numbers = np.zeros(8)
         numbers[contact.STIFFNESS] = k
         numbers[contact.WIDTH] = width
         numbers[contact.DAMPING] = damping
         numbers[contact.SLIP] = law.slip_speed
         numbers[contact.RADIUS] = spec.radius
         numbers[contact.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
+        if law.self_contact:
+            numbers[contact.SELF_STIFFNESS] = 0.25 * spec.linear_density / self._timestep**2
+            numbers[contact.SELF_DAMPING] = self._timestep
         return numbers
 
     def _make_points(self) -> tuple[Array, Array]:
         """Gauss points of every span: arc lengths (Q,) and basis values with weights (Q, 5)."""
         n_spans = self._spline.n_control_points - basis.DEGREE
-        nodes, weights = np.polynomial.legendre.leggauss(self.law.points_per_span)
         span = self._spline.length / n_spans
+        count = self.law.points_per_span
+        if count is None:
+            wanted = int(np.ceil(span / self._spec.radius)) if self.law.self_contact else 0
+            count = min(max(wanted, 3), MOST_POINTS)
+        nodes, weights = np.polynomial.legendre.leggauss(count)
         at = ((np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span).ravel()
         _, values = basis.compute_basis(self._spline.knots, at)
         share = np.tile(0.5 * span * weights, n_spans)

@@ -22,6 +22,7 @@ from hose_mj.hoses.geds.basis import Tables
 from hose_mj.hoses.geds.compiled import compiled, kernel
 from hose_mj.hoses.geds.contact import TOLERANCE, Contact, add_contact
 from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
+from hose_mj.hoses.geds.self_contact import add_self_contact
 from hose_mj.hoses.model import Array
 
 DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE, DEPENDENT_HOLDS = range(5)
@@ -244,6 +245,7 @@ def build(axes, hose, stage, loads, scale, exact, x, work):  # type: ignore[no-u
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
     contact = loads.contact
+    add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
     if contact.geoms.shape[0] + contact.given.shape[0] == 0:
         return 0
     return add_contact(axes, contact, x, work.rate, V, h, exact, work.gradient, work.band)

@@ -82,7 +82,7 @@ class ContactLaw:
         points_per_span: contact is looked for at so many points in each span of the spline; None
             for 3, with self-contact for as many as bring them within a radius of each other.
         self_contact: whether the hose may touch itself, without friction; its stiffness is tied to
-            the time step dt: linear density / (4 dt^2), see geds/self_contact.py.
+            the time step dt: 2 linear density / dt^2, see geds/self_contact.py.
 
     Raises:
         InputError: a value outside its range.

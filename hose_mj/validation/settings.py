@@ -60,7 +60,9 @@ class Setting:
         scheme = self.scheme.removesuffix(", planar")
         options.update(gravity=case.gravity, timestep=self.timestep or 0.005)
         if self.model == "geds":
-            options.update(control_points=self.resolution, plane=case.plane if self.planar else None)
+            options.update(
+                control_points=self.resolution, plane=case.plane if self.planar else None
+            )
             options.setdefault("scheme", "bdf2" if self.timestep is None else scheme)
         else:
             options.update(segments=self.resolution, clamp_correction=bool(self.clamp_corrected))

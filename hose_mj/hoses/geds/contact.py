@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.hoses.geds.compiled import compiled, kernel
-from hose_mj.hoses.geds.shapes import FRICTION, POSITION, SPIN, VELOCITY, is_near, measure
+from hose_mj.hoses.geds.shapes import FRICTION, POSITION, SCALE, SPIN, VELOCITY, is_near, measure
 from hose_mj.hoses.model import Array
 
 STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE, SELF_STIFFNESS, SELF_DAMPING = range(8)
@@ -37,7 +37,7 @@ class Contact(NamedTuple):
     Attributes:
         points: the four basis functions at each contact point and its share of arc length (m),
             (Q, 5), span after span, equally many in each.
-        geoms: one row a shape, see shapes.py, (G, 24).
+        geoms: one row a shape, see shapes.py, (G, 25).
         given: distances handed in, one row a contact point, (Q, 11); (0, 11) for none.
         law: numbers of the contact law, (8,); no self-contact where its stiffness is 0.
         arcs: rest arc lengths of the contact points, (Q,), m.
@@ -91,11 +91,12 @@ def make_push(width, gap):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def compute_force(law, gap, normal, friction, velocity):  # type: ignore[no-untyped-def]
+def compute_force(law, scale, gap, normal, friction, velocity):  # type: ignore[no-untyped-def]
     """Force per length on the hose.
 
     Args:
         law: numbers of the contact law.
+        scale: factor on its stiffness.
         gap: distance of the surfaces (m).
         normal: outward unit normal (3,).
         friction: Coulomb's coefficient.
@@ -108,7 +109,8 @@ def compute_force(law, gap, normal, friction, velocity):  # type: ignore[no-unty
     push, slope = make_push(law[WIDTH], gap)
     u = velocity
     away = u[0] * normal[0] + u[1] * normal[1] + u[2] * normal[2]
-    N = law[STIFFNESS] * max(push - law[DAMPING] * slope * away, 0.0)
+    stiffness = scale * law[STIFFNESS]
+    N = stiffness * max(push - law[DAMPING] * slope * away, 0.0)
     t0 = u[0] - away * normal[0]
     t1 = u[1] - away * normal[1]
     t2 = u[2] - away * normal[2]
@@ -120,7 +122,7 @@ def compute_force(law, gap, normal, friction, velocity):  # type: ignore[no-unty
         N * normal[1] - drag * slip[1],
         N * normal[2] - drag * slip[2],
     )
-    return force, N, law[STIFFNESS] * slope, slip, s
+    return force, N, stiffness * slope, slip, s
 
 
 @kernel
@@ -210,8 +212,9 @@ def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):  # t
                 if step == np.inf:
                     velocity = surface
                 relative = _relate(velocity, surface)
+                scale = contact.geoms[g, SCALE] if g >= 0 else 1.0
                 force, N, slope, slip, s = compute_force(
-                    contact.law, gap, normal, friction, relative
+                    contact.law, scale, gap, normal, friction, relative
                 )
                 if N == 0.0:
                     continue
@@ -221,7 +224,9 @@ def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):  # t
                     matrix = _soften(matrix, normal, bend, N)
                 if friction > 0.0 and step < np.inf:
                     before = _relate(evaluate(axes, contact.points, q, start, base), surface)
-                    _, _, _, usual, _ = compute_force(contact.law, gap, normal, friction, before)
+                    _, _, _, usual, _ = compute_force(
+                        contact.law, scale, gap, normal, friction, before
+                    )
                     matrix = _rub(matrix, normal, slip, usual, friction * N / (step * s))
                 share = contact.points[q, 4]
                 force, matrix = _scale3(share, force), _scale6(share, matrix)
@@ -321,7 +326,8 @@ def compute_forces(axes, contact, x, v, forces, reactions):  # type: ignore[no-u
                 gap, normal, _, friction, surface = find_gap(axes, contact, q, g, start, x)
                 velocity = evaluate(axes, contact.points, q, start, v)
                 relative = _relate(velocity, surface)
-                force = compute_force(contact.law, gap, normal, friction, relative)[0]
+                scale = contact.geoms[g, SCALE] if g >= 0 else 1.0
+                force = compute_force(contact.law, scale, gap, normal, friction, relative)[0]
                 weight = contact.points[q, 4]
                 for c in range(3):
                     forces[q, c] += weight * force[c]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, contact, mechanics, shapes
+from hose_mj.hoses.geds.capsules import Capsules
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.model import Array, Reaction
@@ -62,6 +63,7 @@ class ContactSet:
                 raise InputError("obstacles", obstacle, "records of the class Obstacle")
         self.obstacles, self.law = tuple(obstacles), law
         self._given = np.zeros((0, contact.GIVEN))
+        self._capsules = np.zeros((0, shapes.ROW))
         self._numbers = self._make_law()
         self.arc_lengths, self._points = self._make_points()
         self.rebuild()
@@ -75,7 +77,12 @@ class ContactSet:
         self.contact.geoms[number] = self._make_row(moved)
 
     def set_distances(
-        self, distances: ArrayLike, normals: ArrayLike, friction: ArrayLike, velocity: ArrayLike, x: Array
+        self,
+        distances: ArrayLike,
+        normals: ArrayLike,
+        friction: ArrayLike,
+        velocity: ArrayLike,
+        x: Array,
     ) -> None:
         """Hands in the nearest surface at each contact point, see `Touching.set_distances`."""
         q = len(self.arc_lengths)
@@ -102,11 +109,22 @@ class ContactSet:
         self._given = np.zeros((0, contact.GIVEN))
         self.rebuild()
 
+    def set_capsules(self, capsules: Capsules | None) -> None:
+        """Replaces the capsules that stand for another hose; None for none."""
+        order, offset = self.order, self._spline.offset
+        if capsules is None:
+            self._capsules = np.zeros((0, shapes.ROW))
+        else:
+            scale = capsules.stiffness / self._numbers[contact.STIFFNESS]
+            self._capsules = capsules.make_rows(order, offset, scale)
+        self.rebuild()
+
     def rebuild(self) -> None:
         """Makes what the kernels read; to be called where the plane of the hose has moved."""
         geoms = np.zeros((len(self.obstacles), shapes.ROW))
         for row, obstacle in zip(geoms, self.obstacles, strict=True):
             row[:] = self._make_row(obstacle)
+        geoms = np.concatenate([geoms, self._capsules])
         room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
         self.contact = contact.Contact(
             self._points, geoms, self._given, self._numbers, self.arc_lengths, room
@@ -117,7 +135,7 @@ class ContactSet:
     def compute_forces(self, x: Array, v: Array) -> tuple[Array, Array]:
         """Returns forces on the hose (Q, 3) and on the geoms (G, 6) in the hose's coordinates."""
         forces = np.zeros((len(self._points), 3))
-        reactions = np.zeros((len(self.obstacles), 6))
+        reactions = np.zeros((len(self.contact.geoms), 6))
         mechanics.run_kernel(
             *(contact.compute_forces, self._spline.axes, self.contact, x, v, forces, reactions)
         )
@@ -129,10 +147,27 @@ class ContactSet:
 
     def compute_reactions(self, x: Array, v: Array) -> list[Reaction]:
         """Returns what the hose does to each obstacle, moments about the obstacle's position."""
-        found = self.compute_forces(x, v)[1]
+        found = self.compute_forces(x, v)[1][: len(self.obstacles)]
         forces = self._to_world(found[:, :3])
         moments = self._parity * self._to_world(found[:, 3:])
         return [Reaction(f, m) for f, m in zip(forces, moments, strict=True)]
+
+    def compute_capsule_forces(self, x: Array, v: Array) -> Array:
+        """Returns what the hose does to the ends of the capsules, (m + 1, 3), N, world frame.
+
+        A moment about a capsule's middle becomes a couple of forces at its ends; what lies along
+        its axis is lost.
+        """
+        found = self.compute_forces(x, v)[1][len(self.obstacles) :]
+        forces = self._to_world(found[:, :3])
+        moments = self._parity * self._to_world(found[:, 3:])
+        turned = self._capsules[:, shapes.ROTATION + 2 : shapes.ROTATION + 9 : 3]
+        axes = self._to_world(turned) * (2.0 * self._capsules[:, [shapes.SIZE + 1]])
+        couple = np.cross(moments, axes) / np.sum(axes**2, axis=1, keepdims=True)
+        ends = np.zeros((len(found) + 1, 3))
+        ends[:-1] += 0.5 * forces - couple
+        ends[1:] += 0.5 * forces + couple
+        return ends
 
     # -- state -----------------------------------------------------------------------------------
 
@@ -144,12 +179,14 @@ class ContactSet:
             ],
             "law": asdict(self.law),
             "given": self._given.copy(),
+            "capsules": self._capsules.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot."""
         self.set([Obstacle(**one) for one in state["obstacles"]], ContactLaw(**state["law"]))
         self._given = state["given"].copy()
+        self._capsules = state["capsules"].copy()
         self.rebuild()
 
     # -- inside ----------------------------------------------------------------------------------
@@ -170,8 +207,8 @@ class ContactSet:
         numbers[contact.RADIUS] = spec.radius
         numbers[contact.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
         if law.self_contact:
-            numbers[contact.SELF_STIFFNESS] = 0.25 * spec.linear_density / self._timestep**2
-            numbers[contact.SELF_DAMPING] = self._timestep
+            numbers[contact.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2
+            numbers[contact.SELF_DAMPING] = 0.25 * self._timestep
         return numbers
 
     def _make_points(self) -> tuple[Array, Array]:
@@ -200,6 +237,7 @@ class ContactSet:
         row[shapes.VELOCITY : shapes.VELOCITY + 3] = np.asarray(obstacle.velocity)[order]
         spin = self._parity * np.asarray(obstacle.angular_velocity)[order]
         row[shapes.SPIN : shapes.SPIN + 3] = spin
+        row[shapes.SCALE] = 1.0
         return row
 
     def _to_world(self, rows: Array) -> Array:

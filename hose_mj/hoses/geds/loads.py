@@ -33,15 +33,22 @@ class LoadSet:
         self.clear()
 
     def clear(self) -> None:
-        """Drops all point forces and moments."""
+        """Drops all point forces and moments, those of a neighbour too."""
         self._forces: list[tuple[float, Array]] = []
         self._moments: list[tuple[float, Array]] = []
+        self._push = np.zeros_like(self._weight)
         self._rebuild()
 
     def set_contact(self, contact: Contact) -> None:
         """Replaces what may be touched."""
         self._contact = contact
         self.loads = self.loads._replace(contact=contact)
+
+    def set_push(self, places: Array, forces: Array) -> None:
+        """Replaces the forces (k, 3) of a neighbour at arc lengths (k,)."""
+        points = self._spline.compute_jacobian(places) @ forces[:, self._spline.dims]
+        self._push = points.ravel()
+        self._rebuild()
 
     def add_force(self, arc_length: float, force: ArrayLike) -> None:
         """Adds a point force (3,) N, world frame: f N_i(s) on control point i (thesis A.27).
@@ -73,17 +80,19 @@ class LoadSet:
         return {
             "forces": [(place, vector.copy()) for place, vector in self._forces],
             "moments": [(place, vector.copy()) for place, vector in self._moments],
+            "push": self._push.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot."""
         self._forces = [(place, vector.copy()) for place, vector in state["forces"]]
         self._moments = [(place, vector.copy()) for place, vector in state["moments"]]
+        self._push = state["push"].copy()
         self._rebuild()
 
     def _rebuild(self) -> None:
         d = self._spline.dimension
-        force = self._weight.copy()
+        force = self._weight + self._push
         for place, vector in self._forces:
             starts, values = self._spline.compute_basis(np.array([place]))
             spread = np.outer(values[0, 0], vector[self._spline.dims]).ravel()

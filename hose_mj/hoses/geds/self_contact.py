@@ -8,7 +8,8 @@ not touch.
 
 The matrix gets only the blocks on the band: how a force here depends on a place far along the hose
 is left out. Newton's iteration then converges by k (1 + tau / h) over that plus rho / h^2 at each
-turn, so k is tied to the time step: rho / (4 dt^2), tau = dt, a factor of a third at most.
+turn, so k is tied to the time step: 2 rho / dt^2, tau = dt / 4, a factor of .55 with BDF2 and .71
+with backward Euler at worst.
 """
 
 from __future__ import annotations
@@ -117,9 +118,7 @@ def add_self_contact(axes, contact, x, rate, step, gradient, band):  # type: ign
                         continue
                     if j + 1 < n_segments and _find_nearest(room, q, j + 1)[0] < square:
                         continue
-                    _push_apart(
-                        axes, contact, (q, j, t, per_span), rate, step, gradient, band
-                    )
+                    _push_apart(axes, contact, (q, j, t, per_span), rate, step, gradient, band)
                     touching += 1
     return touching
 

@@ -2,7 +2,8 @@
 
 A geom is one row of numbers, so that a whole scene crosses from Python in one array: its kind
 (MuJoCo's mjtGeom), friction, bounding radius, and then size, position, rotation, velocity and
-angular velocity as in geom_size, geom_xpos and geom_xmat. Distances are negative inside.
+angular velocity as in geom_size, geom_xpos and geom_xmat, last a factor on the contact's stiffness.
+Distances are negative inside.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from hose_mj.hoses.geds.compiled import compiled, kernel
 
 PLANE, SPHERE, CAPSULE, CYLINDER, BOX = 0, 2, 3, 5, 6
 """Kinds, the codes of MuJoCo's mjtGeom. The axis of plane, capsule and cylinder is the local z."""
-KIND, FRICTION, BOUND, SIZE, POSITION, ROTATION, VELOCITY, SPIN = 0, 1, 2, 3, 6, 9, 18, 21
-ROW = 24
+KIND, FRICTION, BOUND, SIZE, POSITION, ROTATION, VELOCITY, SPIN, SCALE = (
+    *(0, 1, 2, 3, 6, 9, 18, 21, 24),
+)
+ROW = 25
 """Columns of a geom's row, and how many there are; the rotation is stored row by row."""
 _NO_AXIS = (0.0, 0.0, 0.0)
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.geds.capsules import check_capsules
 from hose_mj.hoses.geds.contact_set import ContactSet
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.schemes import State
+from hose_mj.hoses.inputs import check_arc_lengths
 from hose_mj.hoses.model import Array, Reaction
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+from hose_mj.hoses.spec import HoseSpec
 
 
 class Touching:
@@ -22,6 +26,7 @@ class Touching:
     """
 
     scheme: str
+    spec: HoseSpec
     _contacts: ContactSet
     _loads: LoadSet
     _state: State
@@ -101,9 +106,7 @@ class Touching:
         if distances is None:
             self._contacts.drop_distances()
         else:
-            self._contacts.set_distances(
-                distances, normals, friction, velocities, self._state.x
-            )
+            self._contacts.set_distances(distances, normals, friction, velocities, self._state.x)
         self._loads.set_contact(self._contacts.contact)
 
     def contact_forces(self) -> Array:
@@ -113,6 +116,46 @@ class Touching:
     def contact_reactions(self) -> list[Reaction]:
         """What the hose does to each obstacle: force (N), moment about its position (N m)."""
         return self._contacts.compute_reactions(self._state.x, self._state.v)
+
+    def set_neighbour(
+        self,
+        points: ArrayLike,
+        velocities: ArrayLike,
+        radius: float,
+        friction: float,
+        stiffness: float,
+    ) -> None:
+        """Hands in another hose as moving capsules, for the steps to come; see `HosePair`.
+
+        Args:
+            points: ends of the capsules (m + 1, 3), m.
+            velocities: of these ends (m + 1, 3), m/s.
+            radius: m.
+            friction: Coulomb's coefficient.
+            stiffness: of this contact (N/m^2); the rest of the law is the hose's.
+
+        Raises:
+            InputError: a wrong shape or a value outside its range; the explicit scheme.
+        """
+        self._check_implicit()
+        made = check_capsules(points, velocities, radius, friction, stiffness)
+        self._contacts.set_capsules(made)
+        self._loads.set_contact(self._contacts.contact)
+
+    def neighbour_forces(self) -> Array:
+        """What the hose does to the ends of the neighbour's capsules, (m + 1, 3), N, world frame."""
+        return self._contacts.compute_capsule_forces(self._state.x, self._state.v)
+
+    def set_push(self, arc_lengths: ArrayLike, forces: ArrayLike) -> None:
+        """Replaces the forces (k, 3), N, by which a neighbour pushes at arc lengths (k,), m.
+
+        They act beside those of `apply_force` until the next call or a reset.
+        """
+        places = check_arc_lengths(arc_lengths, self.spec.length)
+        vectors = np.asarray(forces, dtype=np.float64)
+        if vectors.shape != (len(places), 3) or not np.all(np.isfinite(vectors)):
+            raise InputError("forces", vectors.shape, f"finite numbers, shape ({len(places)}, 3)")
+        self._loads.set_push(places, vectors)
 
     def _check_implicit(self) -> None:
         if self.scheme == "verlet":

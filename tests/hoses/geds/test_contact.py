@@ -120,9 +120,7 @@ def test_capstan(make_hose, plane, points):
     hose = make_hose(
         ea=2e8, ei=1e-5, damping=0.01, plane=plane, control_points=points, gravity=(0, 0, 0)
     )
-    drum = Obstacle(
-        kind="cylinder", rotation=UPRIGHT_Y, size=(radius, 0.2), friction=friction
-    )
+    drum = Obstacle(kind="cylinder", rotation=UPRIGHT_Y, size=(radius, 0.2), friction=friction)
     hose.set_obstacles([drum], ContactLaw(stiffness=1e5))
     bend = radius + RADIUS
     leg = (1.0 - np.pi * bend) / 2
@@ -165,9 +163,7 @@ def test_hose_thrown_at_an_obstacle_comes_to_rest(make_hose, kind, speed):
 
 
 def test_momentum_lost_is_the_impulse_on_the_obstacle(make_hose):
-    hose = make_hose(
-        gravity=(0, 0, 0), scheme="backward-euler", tolerance=1e-12, max_iterations=60
-    )
+    hose = make_hose(gravity=(0, 0, 0), scheme="backward-euler", tolerance=1e-12, max_iterations=60)
     ball = Obstacle(kind="sphere", position=(0.3, 0.02, -0.1), size=0.08, friction=0.4)
     hose.set_obstacles([ball])
     hose.reset([[0, 0, 0], [1, 0, 0]], (0.3, 0.0, -2.0))
@@ -206,9 +202,7 @@ def test_the_motion_turns_with_the_scene(make_hose):
     one.step(60)
     other.step(60)
     assert np.linalg.norm(one.contact_reactions()[0].force) > 0.1
-    np.testing.assert_allclose(
-        other.control_points, one.control_points @ turn.T + shift, atol=1e-7
-    )
+    np.testing.assert_allclose(other.control_points, one.control_points @ turn.T + shift, atol=1e-7)
     np.testing.assert_allclose(
         other.contact_reactions()[0].moment, turn @ one.contact_reactions()[0].moment, atol=1e-5
     )
@@ -284,7 +278,9 @@ def test_far_obstacles_change_nothing(make_hose):
 def test_snapshot_among_obstacles_restores_bitwise(make_hose, plane):
     hose = make_hose(plane=plane)
     ball = Obstacle(kind="sphere", position=(0.4, 0.0, -0.15), size=0.1, velocity=(0, 0, 0.1))
-    hose.set_obstacles([ball, Obstacle(kind="plane", position=(0, 0, -0.3))], ContactLaw(width=1e-4))
+    hose.set_obstacles(
+        [ball, Obstacle(kind="plane", position=(0, 0, -0.3))], ContactLaw(width=1e-4)
+    )
     hose.step(40)
     hose.move_obstacle(0, position=(0.41, 0.0, -0.14))
     saved = hose.snapshot()
@@ -335,7 +331,9 @@ def test_random_states_among_obstacles_stay_finite():
             place, size = rng.uniform(-1.0, 1.0, 3), rng.uniform(0.05, 0.3, 3)
             friction = float(rng.uniform(0.0, 2.0))
             obstacles.append(Obstacle(kind=kind, position=place, size=size, friction=friction))
-        law = ContactLaw(stiffness=10.0 ** rng.uniform(3, 6), slip_speed=10.0 ** rng.uniform(-4, -2))
+        law = ContactLaw(
+            stiffness=10.0 ** rng.uniform(3, 6), slip_speed=10.0 ** rng.uniform(-4, -2)
+        )
         hose.set_obstacles(obstacles, law)
         for _ in range(N_STEPS):
             before = hose.control_points

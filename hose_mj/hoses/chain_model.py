@@ -12,8 +12,8 @@ from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.chain_holds import Held, Load, add_equality, make_layout
 from hose_mj.hoses.chain_kind import ChainKind
 from hose_mj.hoses.chain_layout import rotation_matrix, turn_frame
-from hose_mj.hoses.chain_obstacles import add_obstacles
 from hose_mj.hoses.chain_motion import ChainMass, ChainMotion
+from hose_mj.hoses.chain_obstacles import add_obstacles
 from hose_mj.hoses.chain_settings import ChainSettings
 from hose_mj.hoses.chain_statics import (
     BodyPoint,

@@ -103,7 +103,7 @@ def _make_eight() -> CubicSpline:
     turn = np.linspace(0.0, 2.0 * math.pi, 4001)
     eight = np.stack([np.sin(turn), 0.5 * np.sin(2.0 * turn)], axis=1) * _TOW_WIDTH
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(eight, axis=0), axis=1))])
-    return CubicSpline(along / along[-1], eight + [LENGTH, 0.0])
+    return CubicSpline(along / along[-1], eight + np.array([LENGTH, 0.0]))
 
 
 def find_tow(fraction: Array) -> Array:

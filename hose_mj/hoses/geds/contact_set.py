@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, contact, mechanics, shapes
+from hose_mj.hoses.geds import basis, contact, contact_law, mechanics, shapes
 from hose_mj.hoses.geds.capsules import Capsules
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count
@@ -62,7 +62,7 @@ class ContactSet:
             if not isinstance(obstacle, Obstacle):
                 raise InputError("obstacles", obstacle, "records of the class Obstacle")
         self.obstacles, self.law = tuple(obstacles), law
-        self._given = np.zeros((0, contact.GIVEN))
+        self._given = np.zeros((0, contact_law.GIVEN))
         self._capsules = np.zeros((0, shapes.ROW))
         self._numbers = self._make_law()
         self.arc_lengths, self._points = self._make_points()
@@ -86,7 +86,7 @@ class ContactSet:
     ) -> None:
         """Hands in the nearest surface at each contact point, see `Touching.set_distances`."""
         q = len(self.arc_lengths)
-        given = np.zeros((q, contact.GIVEN))
+        given = np.zeros((q, contact_law.GIVEN))
         turned = np.asarray(normals, dtype=np.float64)
         speeds = np.asarray(velocity, dtype=np.float64)
         try:
@@ -106,7 +106,7 @@ class ContactSet:
 
     def drop_distances(self) -> None:
         """Forgets distances handed in."""
-        self._given = np.zeros((0, contact.GIVEN))
+        self._given = np.zeros((0, contact_law.GIVEN))
         self.rebuild()
 
     def set_capsules(self, capsules: Capsules | None) -> None:
@@ -115,7 +115,7 @@ class ContactSet:
         if capsules is None:
             self._capsules = np.zeros((0, shapes.ROW))
         else:
-            scale = capsules.stiffness / self._numbers[contact.STIFFNESS]
+            scale = capsules.stiffness / self._numbers[contact_law.STIFFNESS]
             self._capsules = capsules.make_rows(order, offset, scale)
         self.rebuild()
 
@@ -126,7 +126,7 @@ class ContactSet:
             row[:] = self._make_row(obstacle)
         geoms = np.concatenate([geoms, self._capsules])
         room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
-        self.contact = contact.Contact(
+        self.contact = contact_law.Contact(
             self._points, geoms, self._given, self._numbers, self.arc_lengths, room
         )
 
@@ -200,15 +200,15 @@ class ContactSet:
         if damping is None:
             damping = 2.0 * np.sqrt(spec.linear_density / k)
         numbers = np.zeros(8)
-        numbers[contact.STIFFNESS] = k
-        numbers[contact.WIDTH] = width
-        numbers[contact.DAMPING] = damping
-        numbers[contact.SLIP] = law.slip_speed
-        numbers[contact.RADIUS] = spec.radius
-        numbers[contact.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
+        numbers[contact_law.STIFFNESS] = k
+        numbers[contact_law.WIDTH] = width
+        numbers[contact_law.DAMPING] = damping
+        numbers[contact_law.SLIP] = law.slip_speed
+        numbers[contact_law.RADIUS] = spec.radius
+        numbers[contact_law.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
         if law.self_contact:
-            numbers[contact.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2
-            numbers[contact.SELF_DAMPING] = 0.25 * self._timestep
+            numbers[contact_law.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2
+            numbers[contact_law.SELF_DAMPING] = 0.25 * self._timestep
         return numbers
 
     def _make_points(self) -> tuple[Array, Array]:

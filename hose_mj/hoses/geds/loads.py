@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.hoses.geds import solver
-from hose_mj.hoses.geds.contact import Contact
+from hose_mj.hoses.geds.contact_law import Contact
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.model import Array
@@ -30,6 +30,7 @@ class LoadSet:
         self._spline = spline
         self._weight = weight
         self._contact = contact
+        self.loads: solver.Loads
         self.clear()
 
     def clear(self) -> None:

@@ -29,8 +29,8 @@ from hose_mj.hoses.spec import HoseSpec, check_number
 class GedsHose(Touching, SplineBody):
     """Geometrically Exact Dynamic Splines (thesis appendix A) with an implicit integrator.
 
-    Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact forces
-    those of `Touching`.
+    Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact
+    forces those of `Touching`.
 
     Args:
         spec: the hose.

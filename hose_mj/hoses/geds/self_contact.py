@@ -17,18 +17,18 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.hoses.geds.compiled import kernel
-from hose_mj.hoses.geds.contact import (
+from hose_mj.hoses.geds.contact import press, scatter
+from hose_mj.hoses.geds.contact_law import (
     RADIUS,
     SELF_DAMPING,
     SELF_STIFFNESS,
     WIDTH,
     evaluate,
     make_push,
-    press,
-    scatter,
 )
 
 REACH = 6.0
+"""Arc between stretches that may touch, in radii."""
 
 
 @kernel

@@ -20,7 +20,8 @@ import numpy as np
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.basis import Tables
 from hose_mj.hoses.geds.compiled import compiled, kernel
-from hose_mj.hoses.geds.contact import TOLERANCE, Contact, add_contact
+from hose_mj.hoses.geds.contact import add_contact
+from hose_mj.hoses.geds.contact_law import TOLERANCE, Contact
 from hose_mj.hoses.geds.energy import Elasticity, Span, assemble, make_span
 from hose_mj.hoses.geds.self_contact import add_self_contact
 from hose_mj.hoses.model import Array

@@ -143,7 +143,7 @@ class Touching:
         self._loads.set_contact(self._contacts.contact)
 
     def neighbour_forces(self) -> Array:
-        """What the hose does to the ends of the neighbour's capsules, (m + 1, 3), N, world frame."""
+        """What the hose does to the ends of the neighbour's capsules, (m + 1, 3), N, world."""
         return self._contacts.compute_capsule_forces(self._state.x, self._state.v)
 
     def set_push(self, arc_lengths: ArrayLike, forces: ArrayLike) -> None:

@@ -134,7 +134,7 @@ def test_capstan(make_hose, plane, points):
     hose.apply_force(0.0, (0.0, 0.0, -force))
     hold = hose.attach(1.0)
     place, pulls = hose.position(1.0)[0], []
-    for k in range(300):
+    for _ in range(300):
         place = place - [0.0, 0.0, 0.05 * hose.timestep]
         hose.move(hold, place)
         hose.step()

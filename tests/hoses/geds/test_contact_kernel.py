@@ -152,7 +152,7 @@ def test_nothing_rubs_in_statics():
     rng = np.random.default_rng(8)
     spline, contacts = make([OBSTACLES["plane"]])
     moving, belt = make([Obstacle(kind="plane", position=(0, 0, -0.03), velocity=(1.0, 0, 0))])
-    x, rate = draw_state(spline, rng)
+    x, _ = draw_state(spline, rng)
     still = np.zeros_like(x)
     one = add(spline, contacts, x, still, still, np.inf, True)[0]
     other = add(moving, belt, x, still, still, np.inf, True)[0]
@@ -211,7 +211,7 @@ def test_surface_velocity_is_that_of_a_rigid_body():
     ball = Obstacle(
         kind="sphere", position=(0.5, 0.0, -0.2), size=0.2, angular_velocity=(0.0, 3.0, 0.0)
     )
-    spline, contacts = make([ball])
+    _, contacts = make([ball])
     x = np.zeros((N, 3))
     x[:, 0] = np.linspace(0.0, 1.0, N)
     force = contacts.compute_world_forces(x.ravel(), np.zeros(3 * N)).sum(axis=0)

@@ -126,7 +126,7 @@ def test_hoses_that_cross_exchange_their_momentum(make_hose, scheme):
 
 
 def test_a_hose_lies_on_another(make_hose):
-    lower, upper = make_hose(), make_hose()
+    lower, upper = make_hose(damping=0.02), make_hose(damping=0.02)
     for hose in (lower, upper):
         hose.add_floor()
     lower.reset([[0.5, -0.5, RADIUS], [0.5, 0.5, RADIUS]])

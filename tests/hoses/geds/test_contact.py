@@ -5,7 +5,7 @@ import pytest
 
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
-from hose_mj.validation.random_states import N_STEPS, make_random_hose
+from hose_mj.validation.random_states import N_STEPS, make_random_hose, set_random_obstacles
 
 WEIGHT, RADIUS = 0.1 * 9.81, 0.01
 FLOOR = Obstacle(kind="plane", friction=0.4)
@@ -326,15 +326,7 @@ def test_random_states_among_obstacles_stay_finite():
     verdicts = touched = 0
     for _ in range(150):
         hose = make_random_hose(rng)
-        obstacles = [Obstacle(kind="plane", position=(0, 0, rng.uniform(-0.5, 0.2)))]
-        for kind in ("sphere", "capsule", "cylinder", "box"):
-            place, size = rng.uniform(-1.0, 1.0, 3), rng.uniform(0.05, 0.3, 3)
-            friction = float(rng.uniform(0.0, 2.0))
-            obstacles.append(Obstacle(kind=kind, position=place, size=size, friction=friction))
-        law = ContactLaw(
-            stiffness=10.0 ** rng.uniform(3, 6), slip_speed=10.0 ** rng.uniform(-4, -2)
-        )
-        hose.set_obstacles(obstacles, law)
+        set_random_obstacles(hose, rng)
         for _ in range(N_STEPS):
             before = hose.control_points
             try:

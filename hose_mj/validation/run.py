@@ -19,7 +19,8 @@ from hose_mj.validation.settings import (
 )
 
 LOST = 0.5
-"""An error above this fraction counts as unstable even where no number overflowed."""
+"""A chain's error above this fraction counts as unstable even where no number overflowed, but in
+cases where models are expected to differ."""
 EQUAL_ERRORS = (0.01, 0.001)
 """Errors at which costs are compared."""
 N_CONTENDERS = 2
@@ -222,7 +223,8 @@ def _score(case: Case, setting: Setting, reference: Reference) -> Outcome | None
     except StepError:
         return None
     error = _distance(values, reference.values) / case.scale
-    if not (error < LOST or (setting.model == "geds" and np.isfinite(error))):
+    may_be_far = setting.model == "geds" or not case.has_ratios
+    if not (error < LOST or (may_be_far and np.isfinite(error))):
         return None
     return Outcome(
         case.id,

@@ -163,7 +163,8 @@ def list_ladders(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[li
 
     Raw clamps are there to be seen, not to win: they run with a model's first scheme alone. Driven
     holds and contacts leave rk4 out: with MuJoCo's soft holds it was stable at .04 ms only, with 20
-    segments, and on an obstacle not at 1 ms.
+    segments, and on an obstacle not at 1 ms. Where costs are not compared, a chain's two coarsest
+    resolutions show its gap.
     """
     stiff = case.obstacles or (case.motion is not None and case.motion.drive is not None)
     for model in models:
@@ -172,7 +173,10 @@ def list_ladders(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[li
                 continue
             if scheme.endswith(", planar") and case.plane is None:
                 continue
-            for resolution in grid.dynamic[model]:
+            resolutions = grid.dynamic[model]
+            if model != "geds" and not case.has_ratios:
+                resolutions = resolutions[:2]
+            for resolution in resolutions:
                 for corrected in _clamps(model, case):
                     raw = corrected is False
                     if raw and (scheme != grid.schemes[model][0] or resolution not in RAW_CLAMPS):

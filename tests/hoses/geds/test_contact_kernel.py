@@ -218,3 +218,26 @@ def test_surface_velocity_is_that_of_a_rigid_body():
     # omega x arm = (0, 3, 0) x (0, 0, .2) = (.6, 0, 0), far above the slip speed.
     assert force[0] == pytest.approx(0.5 * force[2], rel=0.05)
     assert force[1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_fourth_unknown_is_left_alone():
+    rng = np.random.default_rng(12)
+    spline, contacts = make(list(OBSTACLES.values()))
+    x, rate = draw_state(spline, rng)
+    gradient, matrix, touching = add(spline, contacts, x, rate, rate, STEP, True)
+
+    def widen(flat):
+        """The same with a turn of the section behind each control point's coordinates."""
+        return np.concatenate([flat.reshape(-1, 3), rng.normal(size=(N, 1))], axis=1).ravel()
+
+    axes, size = (0.0,) * 4, 4 * N
+    wide, band = np.zeros(size + 16), np.zeros((size + 16, 32))
+    arguments = (contacts.contact, widen(x), widen(rate), widen(rate), STEP, True)
+    assert contact.add_contact(axes, *arguments, wide, band) == touching > 0
+    places = np.arange(size).reshape(N, 4)
+    space, turn = places[:, :3].ravel(), places[:, 3]
+    np.testing.assert_allclose(wide[space], gradient, rtol=1e-12, atol=1e-12)
+    dense = mechanics.make_dense(band, size, 16)
+    np.testing.assert_allclose(dense[np.ix_(space, space)], matrix, rtol=1e-12, atol=1e-9)
+    assert not wide[turn].any()
+    assert not dense[turn].any()

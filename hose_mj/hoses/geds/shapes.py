@@ -14,9 +14,9 @@ from hose_mj.hoses.geds.compiled import compiled, kernel
 
 PLANE, SPHERE, CAPSULE, CYLINDER, BOX = 0, 2, 3, 5, 6
 """Kinds, the codes of MuJoCo's mjtGeom. The axis of plane, capsule and cylinder is the local z."""
-KIND, FRICTION, BOUND, SIZE, POSITION, ROTATION, VELOCITY, SPIN, SCALE = (
-    *(0, 1, 2, 3, 6, 9, 18, 21, 24),
-)
+KIND, FRICTION, BOUND = 0, 1, 2
+SIZE, POSITION, ROTATION = 3, 6, 9
+VELOCITY, SPIN, SCALE = 18, 21, 24
 ROW = 25
 """Columns of a geom's row, and how many there are; the rotation is stored row by row."""
 _NO_AXIS = (0.0, 0.0, 0.0)

@@ -10,6 +10,7 @@ import numpy as np
 from hose_mj.recording import plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import Outcome
+from tools.compare_obstacles import find_outlines
 from tools.compare_study import SHOWN_WITHIN, Study
 
 Pictures = dict[str, bytes]
@@ -173,7 +174,8 @@ def _draw_motion(result: CaseResult, ratios: list[Ratio], within: float) -> Pict
     shown = choose_shown(result, within)
     curves, times = _pick_snapshots(shown)
     plane = choose_plane(curves.values())
-    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, plane, times=times)
+    outlines = find_outlines(case.obstacles, plane)
+    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, plane, times, outlines)
     if "geds" in shown and len(shown) > 1:
         pictures[f"{case.id}-distance"] = _draw_distance(shown)
     return pictures
@@ -229,6 +231,13 @@ def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
     title = members[0].case.title if len(members) == 1 else family.replace("-", " ").capitalize()
     of = "reference" if members[0].case.scale is None else "length"
     pictures = {family: plots.plot_errors(title, points, f"error (of the {of})")}
+    case = members[0].case
+    if case.obstacles:
+        ours = max(members[0].outcomes, key=lambda outcome: outcome.setting.resolution)
+        curves = {describe_setting(ours): ours.points[0]}
+        plane = choose_plane(curves.values())
+        outlines = find_outlines(case.obstacles, plane)
+        pictures[f"{family}-shapes"] = plots.plot_shapes(title, curves, plane, outlines=outlines)
     if family in FANS and len(members) > 1:
         fans = [_make_fan(members, "geds", None), _make_fan(members, "cable", False)]
         pictures[f"{family}-shapes"] = plots.plot_fan(title, [fan for fan in fans if fan])

@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike
 
 from hose_mj.hoses.chain_kind import ChainKind
 from hose_mj.hoses.chain_layout import ChainLayout, conjugate, multiply, rotation_matrix
+from hose_mj.hoses.chain_obstacles import check_obstacles
 from hose_mj.hoses.chain_settings import ChainSettings
 from hose_mj.hoses.model import Array
 from hose_mj.hoses.mujoco_chain import MujocoChainHose
+from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 _XML = """
@@ -38,7 +40,8 @@ _XML = """
 class CableHose(MujocoChainHose):
     """`<composite type="cable">` with the elasticity plugin of MuJoCo 3.17.
 
-    Rigid segments of equal length, ball joints between them, no contacts. The plugin multiplies
+    Rigid segments of equal length, ball joints between them, contacts with obstacles alone. The
+    plugin multiplies
     `bend` and `twist` (Pa) by the section of a solid cylinder of the geom's radius r: they are set
     to EI / (pi r^4 / 4) and GJ / (pi r^4 / 2). Its forces are explicit with any integrator, so the
     largest stable time step falls with stiffness and number of segments; with few segments the
@@ -63,6 +66,7 @@ class CableHose(MujocoChainHose):
             makes a hose that is held twice as slow.
         hold_solref: MuJoCo's solref of holds; None for twice the time step, critically damped.
         hold_solimp: their solimp.
+        obstacles: static shapes that the segments collide with.
 
     Raises:
         InputError: a value outside its valid set.
@@ -83,6 +87,7 @@ class CableHose(MujocoChainHose):
         jacobian: str = "dense",
         hold_solref: Sequence[float] | None = None,
         hold_solimp: Sequence[float] = (0.9999, 0.9999, 0.001, 0.5, 2.0),
+        obstacles: Sequence[Obstacle] = (),
     ) -> None:
         twist = spec.torsional_stiffness if torsional_stiffness is None else torsional_stiffness
         check_number("torsional_stiffness", twist, may_be_zero=True)
@@ -97,6 +102,7 @@ class CableHose(MujocoChainHose):
             jacobian=jacobian,
             hold_solref=hold_solref,
             hold_solimp=hold_solimp,
+            obstacles=check_obstacles(obstacles),
         )
         super().__init__(spec, BallJoints(spec, twist), settings)
 

@@ -20,6 +20,7 @@ from hose_mj.hoses.chain_holds import (
 from hose_mj.hoses.chain_kind import ChainKind
 from hose_mj.hoses.chain_layout import rotation_matrix, transport_frames, turn_frame
 from hose_mj.hoses.chain_motion import ChainMass, ChainMotion
+from hose_mj.hoses.chain_obstacles import add_obstacles
 from hose_mj.hoses.chain_settings import ChainSettings
 from hose_mj.hoses.chain_statics import (
     BodyPoint,
@@ -65,6 +66,7 @@ class ChainModel(MujocoModel):
         root = next((self._root_pose(item) for item in held if item.rigid), None)
         maker, bodies = kind.make_chain(self.layout, root)
         settings.apply(maker.option)
+        add_obstacles(maker, bodies, settings.obstacles, settings.timestep)
         for k, body in enumerate(bodies):
             body.explicitinertial = True
             body.mass, body.inertia = max(self.mass.mass[k], 1e-300), self.mass.inertia[k]

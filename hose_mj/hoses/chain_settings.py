@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_choice, check_count, check_vector
 from hose_mj.hoses.model import Array
+from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.spec import check_number
 
 INTEGRATORS = ("euler", "implicit", "implicitfast", "discrete", "rk4")
@@ -35,6 +36,7 @@ class ChainSettings:
         hold_solref: MuJoCo's solref of clamps and attachments; None for a time constant of two
             steps, critically damped.
         hold_solimp: their solimp.
+        obstacles: what the chain collides with.
     """
 
     timestep: float
@@ -47,6 +49,7 @@ class ChainSettings:
     jacobian: str
     hold_solref: Sequence[float] | None
     hold_solimp: Sequence[float]
+    obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         check_number("timestep", self.timestep)

@@ -78,6 +78,17 @@ class MujocoChainHose(MujocoHose):
     def _is_root(self, arc_length: float) -> bool:
         return arc_length == 0.0
 
+    def solve_static(self) -> None:
+        """Moves the hose to static equilibrium; see `MujocoHose.solve_static`.
+
+        Raises:
+            InputError: a chain with obstacles, which must come to rest by itself.
+            StepError: no equilibrium was found; the state before is kept.
+        """
+        if self.settings.obstacles:
+            raise InputError("obstacles", len(self.settings.obstacles), "none in a chain's statics")
+        super().solve_static()
+
 
 def check_plain(name: str, spec: HoseSpec) -> None:
     """Raises `InputError` for what no hose inside an mjModel has, `name` being its class."""

@@ -31,6 +31,8 @@ from hose_mj.recording.plot_style import add_legend, encode_png, make_axes
 
 _WIDTHS = (6.0, 2.6, 1.0, 0.8)
 """Line widths (points) of models on top of each other, the first lowest."""
+_SOLID = "#d9d9d9"
+"""Colour of solid things behind the hoses."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ def plot_shapes(
     curves: Mapping[str, ArrayLike],
     plane: tuple[int, int] = (0, 2),
     times: Sequence[float] | None = None,
+    outlines: Sequence[Array] = (),
 ) -> bytes:
     """Hoses seen along one axis, to scale, several models over each other.
 
@@ -61,25 +64,31 @@ def plot_shapes(
         curves: label to points (m, 3), or (k, m, 3) for k snapshots, the earlier the paler.
         plane: the two coordinates shown, horizontal first.
         times: of the snapshots (s), written beside them.
+        outlines: of solid things, polygons (k, 2) in the plane shown (m), behind the hoses.
     """
     check_some("curves", curves)
     stacks = _flatten(curves, plane)
-    size = choose_size(np.concatenate([stack.reshape(-1, 2) for stack in stacks.values()]))
+    size = choose_size(np.concatenate([*_list_corners(stacks), *outlines]))
     columns = 2 if size[0] > 7.0 else 1
     rows = -(-len(stacks) // columns)
     with make_axes(_wrap(title, size), (size[0], size[1] + 0.2 * rows)) as (figure, axes):
-        handles = draw_shapes(axes, stacks, plane)
+        handles = draw_shapes(axes, stacks, plane, outlines)
         add_legend(figure, handles, columns)
         label_snapshots(figure, axes, stacks, times)
         return encode_png(figure)
 
 
 def draw_shapes(
-    axes: Axes, stacks: Mapping[str, Array], plane: tuple[int, int] = (0, 2)
+    axes: Axes,
+    stacks: Mapping[str, Array],
+    plane: tuple[int, int] = (0, 2),
+    outlines: Sequence[Array] = (),
 ) -> list[Line2D]:
     """Draws snapshots (k, m, 2) by label into axes; returns what the legend has to hold."""
-    every = np.concatenate([stack.reshape(-1, 2) for stack in stacks.values()])
+    every = np.concatenate([*_list_corners(stacks), *outlines])
     unit, factor = choose_length_unit(float(np.ptp(every, axis=0).max()))
+    for outline in outlines:
+        axes.fill(*(factor * outline).T, color=_SOLID, lw=0.0, zorder=1)
     handles = []
     for rank, (label, stack) in enumerate(stacks.items()):
         width = _WIDTHS[min(rank, len(_WIDTHS) - 1)]
@@ -171,6 +180,11 @@ def choose_label_point(stack: Array) -> int:
 
     n = stack.shape[1]
     return n - 1 if len(stack) < 2 else int(max((n - 1, n // 2, 0), key=spread))
+
+
+def _list_corners(stacks: Mapping[str, Array]) -> list[Array]:
+    """All points drawn, (k, 2) each."""
+    return [stack.reshape(-1, 2) for stack in stacks.values()]
 
 
 def _flatten(curves: Mapping[str, ArrayLike], plane: tuple[int, int]) -> dict[str, Array]:

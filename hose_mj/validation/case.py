@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import j0
 
 from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
 
 LENGTH = 1.0
@@ -58,6 +59,17 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Reference:
+    """The truth of a motion: probe values (k, q), and how far two resolutions of it still differ.
+
+    `uncertainty` is a fraction of L.
+    """
+
+    values: Array
+    uncertainty: float
+
+
+@dataclass(frozen=True)
 class Case:
     """One case.
 
@@ -80,6 +92,13 @@ class Case:
         resolutions: by model, in place of the grid's; static cases only.
         promised: largest error of GEDS by control points, which `compare` checks; by default that
             of the finest.
+        obstacles: what the hose may touch.
+        contact_law: of GEDS; None for its defaults.
+        reference: computes the motion's truth where that is not the converged limit of GEDS.
+        uncertainty: how far two resolutions of the reference may differ, of L.
+        promise: error that GEDS keeps with its finest setting; motions only, None for no promise.
+        has_ratios: False where models do not converge to the same motion, so that costs at equal
+            error mean nothing.
     """
 
     id: str
@@ -99,6 +118,12 @@ class Case:
     steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
     resolutions: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     promised: Mapping[int, float] = field(default_factory=dict)
+    obstacles: tuple[Obstacle, ...] = ()
+    contact_law: ContactLaw | None = None
+    reference: Callable[[], Reference] | None = None
+    uncertainty: float = 1e-4
+    promise: float | None = None
+    has_ratios: bool = True
 
 
 def lay_straight(hose: HoseModel) -> None:

@@ -10,6 +10,7 @@ import math
 
 from hose_mj.errors import InputError
 from hose_mj.validation.case import Case
+from hose_mj.validation.contacts import make_capstan, make_floor_tow, make_obstacle_drop
 from hose_mj.validation.motions import (
     make_free_flight,
     make_released_rod,
@@ -51,6 +52,9 @@ CASES: tuple[Case, ...] = (
     make_released_rod(),
     make_taut_pull(),
     make_suture_pull(),
+    make_capstan(),
+    make_floor_tow(),
+    make_obstacle_drop(),
 )
 
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from hose_mj.checks import Check
 from hose_mj.hoses.model import Array
-from hose_mj.validation.case import Case
+from hose_mj.validation.case import Case, Reference
 from hose_mj.validation.run import (
     EQUAL_ERRORS,
     Outcome,
-    Reference,
     Skipped,
     compute_reference,
     run_ladder,
@@ -92,7 +91,8 @@ def run_case(
         result.outcomes += outcomes
         result.skipped += skipped
     advance("timing")
-    time_rounds(case, result.outcomes, grid)
+    if case.has_ratios:
+        time_rounds(case, result.outcomes, grid)
     result.limit_gap = compute_limit_gap(result)
     return result
 
@@ -143,7 +143,9 @@ def find_cheapest(
 
 def compute_ratios(result: CaseResult, levels: Sequence[float] = EQUAL_ERRORS) -> list[Ratio]:
     """Wall-time ratios at equal error, GEDS in space and in its plane against the others."""
-    ratios = []
+    ratios: list[Ratio] = []
+    if not result.case.has_ratios:
+        return ratios
     others = dict.fromkeys(outcome.setting.model for outcome in result.outcomes)
     others.pop("geds", None)
     for at_error in levels:
@@ -191,19 +193,32 @@ def check_motions(result: CaseResult) -> list[Check]:
     """Checks of one dynamic case: its references, and for the released rod errors and ratios."""
     checks = []
     case_id = result.case.id
-    for name, reference in (
-        ("stretchable", result.stretchable),
-        ("inextensible", result.inextensible),
-    ):
+    references = {"stretchable": result.stretchable, "inextensible": result.inextensible}
+    if result.case.reference is not None:
+        references = {"quasi-static": result.stretchable or result.inextensible}
+    for name, reference in references.items():
         if reference is not None:
             text = f"{case_id}: two resolutions of the {name} reference differ by (of L)"
-            checks.append(Check(text, reference.uncertainty, 1e-4))
+            checks.append(Check(text, reference.uncertainty, result.case.uncertainty))
     if result.limit_gap is not None:
         text = f"{case_id}: MuJoCo's Richardson limit differs from the reference by (of L)"
         checks.append(Check(text, result.limit_gap, 1e-3))
+    if result.case.promise is not None:
+        checks += _check_promise(result, result.case.promise)
     if case_id == "released-rod":
         checks += _check_released_rod(result)
     return checks
+
+
+def _check_promise(result: CaseResult, promise: float) -> list[Check]:
+    """The error of GEDS with the most control points run, at its best time step."""
+    ours = [o for o in result.outcomes if o.setting.model == "geds"]
+    if not ours:
+        return []
+    finest = max(outcome.setting.resolution for outcome in ours)
+    error = min(outcome.error for outcome in ours if outcome.setting.resolution == finest)
+    text = f"{result.case.id}: error of GEDS with {finest} control points (of L)"
+    return [Check(text, error, promise)]
 
 
 _PROMISED = {

@@ -11,7 +11,7 @@ from hose_mj.checks import Check
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.registry import MODELS
 from hose_mj.scenes.own_hose import OwnHose
-from hose_mj.validation.case import Case
+from hose_mj.validation.case import Case, Reference
 from hose_mj.validation.compare import CaseResult
 from hose_mj.validation.own_answers import (
     Answer,
@@ -24,7 +24,6 @@ from hose_mj.validation.run import (
     BUDGET_SPENT,
     REFERENCE_POINTS,
     Outcome,
-    Reference,
     Skipped,
     compute_distance,
     compute_reference,

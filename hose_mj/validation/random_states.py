@@ -10,6 +10,7 @@ import numpy as np
 from hose_mj.errors import StepError
 from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.model import Array
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
 
 N_STEPS = 3
@@ -36,7 +37,7 @@ def make_random_hose(rng: np.random.Generator) -> GedsHose:
 
     Shapes: control points displaced by up to 2 L, four of them coincident, the polygon folded back
     onto itself by 180 degrees, or a small disturbance. EA L^2 / EI from 1e2 to 1e8, time steps from
-    1e-4 to 2e-2 s, two forces of up to 100 weights.
+    1e-4 to 2e-2 s, two forces of up to 100 weights; half of the hoses among obstacles.
     """
     stiffness = 0.05
     n = int(rng.choice([6, 8, 12, 16, 24]))
@@ -65,7 +66,24 @@ def make_random_hose(rng: np.random.Generator) -> GedsHose:
         force[1] *= plane is None
         force *= rng.uniform(0.0, 100.0) * spec.mass * 9.81 / np.linalg.norm(force)
         hose.apply_force(float(rng.uniform(0.0, 1.0)), force)
+    if rng.random() < 0.5:
+        set_random_obstacles(hose, rng)
     return hose
+
+
+def set_random_obstacles(hose: GedsHose, rng: np.random.Generator) -> None:
+    """Puts a floor and one shape of each kind where a hose is: often it starts deep inside them."""
+    height = float(rng.uniform(-0.5, 0.2))
+    obstacles = [Obstacle(kind="plane", position=(0.0, 0.0, height))]
+    for kind in ("sphere", "capsule", "cylinder", "box"):
+        place, size = rng.uniform(-1.0, 1.0, 3), rng.uniform(0.05, 0.3, 3)
+        friction = float(rng.uniform(0.0, 2.0))
+        obstacles.append(Obstacle(kind=kind, position=place, size=size, friction=friction))
+    stiffness = float(10.0 ** rng.uniform(3.0, 6.0))
+    slip_speed = float(10.0 ** rng.uniform(-4.0, -2.0))
+    self_contact = bool(rng.random() < 0.5)
+    law = ContactLaw(stiffness=stiffness, slip_speed=slip_speed, self_contact=self_contact)
+    hose.set_obstacles(obstacles, law)
 
 
 def _draw_polygon(polygon: Array, plane: str | None, rng: np.random.Generator) -> Array:

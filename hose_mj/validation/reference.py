@@ -93,3 +93,8 @@ def catenary(length_over_span: float) -> tuple[float, float]:
 def euler_load(ends: str) -> float:
     """Critical thrust P L^2 / EI: "clamped-free" or "pinned"."""
     return {"clamped-free": math.pi**2 / 4.0, "pinned": math.pi**2}[ends]
+
+
+def capstan(friction: float, angle: float) -> float:
+    """Ratio of the pulls on a rope that slides over a drum: exp(mu theta) (Euler, Eytelwein)."""
+    return math.exp(friction * angle)

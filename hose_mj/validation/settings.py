@@ -69,6 +69,10 @@ class Setting:
         if self.model == "cable" and self.timestep is not None and case.planar:
             # In a plane nothing twists: less torsional stiffness allows the cable larger steps.
             options.update(torsional_stiffness=CABLE_TWIST * case.spec.bending_stiffness)
+        if case.obstacles:
+            options.update(obstacles=case.obstacles)
+            if self.model == "geds":
+                options.update(contact_law=case.contact_law)
         return make_hose(self.model, case.spec, **options)
 
 
@@ -93,7 +97,7 @@ class Grid:
         longest_run: a run that would take longer is left out (s).
         longest_timed_run: a run that took longer is not timed again (s).
         rounds: how often a short run is timed, all models in turn; the least counts.
-        reference_steps: between two samples of a reference, free and driven, the finer of two.
+        reference_steps: between two samples of a reference, free and damped, the finer of two.
     """
 
     static: dict[str, tuple[int, ...]]
@@ -175,15 +179,20 @@ def list_ladders(
     """Yields, for each model, scheme and resolution, the time steps to try, coarse to fine.
 
     Raw clamps are there to be seen, not to win: they run with a model's first scheme alone. Driven
-    holds leave rk4 out: with MuJoCo's soft holds it was stable at .04 ms only, with 20 segments.
+    holds and contacts leave rk4 out: with MuJoCo's soft holds it was stable at .04 ms only, with 20
+    segments, and on an obstacle not at 1 ms. Where costs are not compared, a chain's two coarsest
+    resolutions show its gap.
     """
     list_steps = list_steps or _steps
-    driven = case.motion is not None and case.motion.drive is not None
+    stiff = case.obstacles or (case.motion is not None and case.motion.drive is not None)
     for model in models:
         for scheme in grid.schemes[model]:
-            if (scheme == "rk4" and driven) or (scheme.endswith("planar") and not case.planar):
+            if (scheme == "rk4" and stiff) or (scheme.endswith("planar") and not case.planar):
                 continue
-            for resolution in grid.dynamic[model]:
+            resolutions = grid.dynamic[model]
+            if model != "geds" and not case.has_ratios:
+                resolutions = resolutions[:2]
+            for resolution in resolutions:
                 for corrected in _clamps(model, case):
                     raw = corrected is False
                     if raw and (scheme != grid.schemes[model][0] or resolution not in RAW_CLAMPS):

@@ -184,3 +184,8 @@ def test_labels_are_spread_as_little_as_possible():
 def test_bad_input_is_refused(draw):
     with pytest.raises(InputError):
         draw()
+
+
+def test_outlines_are_drawn_and_seen_whole():
+    square = np.array([[0.0, -3.0], [1.0, -3.0], [1.0, -2.0], [0.0, -2.0]])
+    assert plots.plot_shapes("t", SHAPES, outlines=[square]) != plots.plot_shapes("t", SHAPES)

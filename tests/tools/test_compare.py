@@ -11,9 +11,10 @@ import pyarrow.parquet
 import pytest
 
 from hose_mj.checks import Check
+from hose_mj.validation.case import Reference
 from hose_mj.validation.cases import CASES, find_cases
 from hose_mj.validation.compare import CaseResult
-from hose_mj.validation.run import Outcome, Reference
+from hose_mj.validation.run import Outcome
 from hose_mj.validation.settings import Setting
 from tools import cli, compare_study
 from tools.compare import MODELS, Args, check_arguments

@@ -97,8 +97,8 @@ def make_outcome():
 @pytest.fixture
 def make_result(case):
     """A case result of these outcomes, with a reference of these values (by default none)."""
+    from hose_mj.validation.case import Reference
     from hose_mj.validation.compare import CaseResult
-    from hose_mj.validation.run import Reference
 
     def make(*outcomes, reference=None):
         result = CaseResult(case, list(outcomes))

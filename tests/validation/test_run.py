@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hose_mj.validation.case import Reference
 from hose_mj.validation.compare import (
     EQUAL_ERRORS,
     check_motions,
@@ -18,7 +19,6 @@ from hose_mj.validation.compare import (
 )
 from hose_mj.validation.run import (
     LOST,
-    Reference,
     compute_reference,
     run_ladder,
     run_static,
@@ -321,3 +321,24 @@ def test_no_limit_without_two_resolutions_a_factor_of_two_apart(make_outcome, ma
     assert compute_limit_gap(make_result(*outcomes, reference=LIMIT)) is None
     assert compute_limit_gap(make_result(reference=LIMIT)) is None
     assert compute_limit_gap(make_result(make_outcome())) is None
+
+
+def test_where_costs_are_not_compared_a_chain_may_be_far_off(case, fake):
+    fake.error = staticmethod(lambda step, n: 2.0 * LOST)
+    assert not run(case, "cable")[1]
+    assert run(replace(case, has_ratios=False), "cable")[1]
+
+
+def test_where_costs_are_not_compared_there_is_no_ratio(case, make_outcome, make_result):
+    result = make_result(make_outcome("geds"), make_outcome("cable", clamp=True))
+    assert compute_ratios(result)
+    result.case = replace(case, has_ratios=False)
+    assert compute_ratios(result) == []
+
+
+def test_a_motion_that_promises_an_error_is_checked(case, make_outcome, make_result):
+    outcomes = [make_outcome(n=n, error=error) for n, error in ((8, 0.2), (16, 0.03), (16, 0.02))]
+    result = make_result(*outcomes)
+    result.case = replace(case, promise=0.01)
+    (check,) = check_motions(result)
+    assert (check.value, check.limit, check.ok) == (0.02, 0.01, False)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.hoses.geds import solver
+from hose_mj.hoses.geds.contact_law import Contact
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.model import Array
@@ -19,20 +20,34 @@ class LoadSet:
     Args:
         spline: the hose's geometry.
         weight: generalised force of gravity on the control points, flat (n d,), N.
+        contact: what may be touched; `set_contact` replaces it.
 
     Attributes:
         loads: what the kernels read; made anew by every change.
     """
 
-    def __init__(self, spline: Spline, weight: Array) -> None:
+    def __init__(self, spline: Spline, weight: Array, contact: Contact) -> None:
         self._spline = spline
         self._weight = weight
+        self._contact = contact
+        self.loads: solver.Loads
         self.clear()
 
     def clear(self) -> None:
-        """Drops all point forces and moments."""
+        """Drops all point forces and moments, those of a neighbour too."""
         self._forces: list[tuple[float, Array]] = []
         self._moments: list[tuple[float, Array]] = []
+        self._push = np.zeros_like(self._weight)
+        self._rebuild()
+
+    def set_contact(self, contact: Contact) -> None:
+        """Replaces what may be touched."""
+        self._contact = contact
+        self.loads = self.loads._replace(contact=contact)
+
+    def set_push(self, places: Array, forces: Array) -> None:
+        """Replaces the forces (k, 3) of a neighbour at arc lengths (k,)."""
+        self._push = self._spline.from_world(self._spline.compute_jacobian(places) @ forces)
         self._rebuild()
 
     def add_force(self, arc_length: float, force: ArrayLike) -> None:
@@ -65,17 +80,19 @@ class LoadSet:
         return {
             "forces": [(place, vector.copy()) for place, vector in self._forces],
             "moments": [(place, vector.copy()) for place, vector in self._moments],
+            "push": self._push.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot."""
         self._forces = [(place, vector.copy()) for place, vector in state["forces"]]
         self._moments = [(place, vector.copy()) for place, vector in state["moments"]]
+        self._push = state["push"].copy()
         self._rebuild()
 
     def _rebuild(self) -> None:
         d, stride = self._spline.dimension, self._spline.stride
-        force = self._weight.copy()
+        force = self._weight + self._push
         for place, vector in self._forces:
             starts, values = self._spline.compute_basis(np.array([place]))
             window = force[starts[0] : starts[0] + 4 * stride].reshape(4, stride)
@@ -89,4 +106,4 @@ class LoadSet:
             else:
                 moments[k, 0] = vector @ self._spline.normal
         values = np.ascontiguousarray(values[:, :2])
-        self.loads = solver.Loads(force, starts, values, moments)
+        self.loads = solver.Loads(force, starts, values, moments, self._contact)

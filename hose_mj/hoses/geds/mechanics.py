@@ -7,12 +7,15 @@ import numpy as np
 from hose_mj.compiled import compile_notice, run_kernel
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, schemes, solver
+from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.fittings import average, make_cells
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist
 from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
+
+_ENDLESS = float(np.finfo(np.float64).max)
 
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
@@ -84,10 +87,10 @@ def build_tangent(
     v: Array,
     work: solver.Work,
 ) -> None:
-    """Writes dU + C v less the point moments to work.gradient, its derivative by x to work.band.
+    """Writes dU + C v less moments and contact to work.gradient, its derivative to work.band.
 
-    Forces, gravity, inertia and holds are left out; so are the derivative of the damping and the
-    rank-one terms of the twist.
+    Forces, gravity, inertia and holds are left out; so are the derivative of damping and friction
+    and the rank-one terms of the twist.
     """
     work.gradient[:] = 0.0
     work.band[:] = 0.0
@@ -98,6 +101,11 @@ def build_tangent(
         *(work.span, work.gradient, work.band),
     )
     run_kernel(solver.add_moments, axes, loads, True, x, work)
+    # Within a step without end nothing changes its velocity, but what slides still rubs.
+    run_kernel(
+        *(add_contact, axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
+        *(work.gradient, work.band),
+    )
 
 
 def make_dense(band: Array, size: int, width: int) -> Array:

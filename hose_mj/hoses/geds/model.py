@@ -6,6 +6,7 @@ on it, mechanics.py how the kernels are called.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,20 +16,24 @@ from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds import mechanics, schemes, solver, statics
 from hose_mj.hoses.geds.body import SplineBody
+from hose_mj.hoses.geds.contact_set import ContactSet
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.touching import Touching
 from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.model import Array, Curve, Hold, Linearization, Reaction
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
 
 
-class GedsHose(SplineBody):
+class GedsHose(Touching, SplineBody):
     """Geometrically Exact Dynamic Splines (thesis appendix A) with an implicit integrator.
 
-    Queries (position, tension, energies, ...) are those of `SplineBody`.
+    Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact
+    forces those of `Touching`.
 
     Args:
         spec: the hose.
@@ -44,6 +49,8 @@ class GedsHose(SplineBody):
         tolerance: Newton goes on while it moves a control point by more than this fraction of L;
             with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
         max_iterations: Newton iterations in a stage before the careful fallback.
+        obstacles: what the hose may touch; `set_obstacles` changes it.
+        contact_law: numbers of the contact; None for the defaults.
 
     Attributes:
         spec, gravity, scheme: as given.
@@ -66,6 +73,8 @@ class GedsHose(SplineBody):
         scheme: str = "bdf2",
         tolerance: float = 2e-4,
         max_iterations: int = 20,
+        obstacles: Sequence[Obstacle] = (),
+        contact_law: ContactLaw | None = None,
     ) -> None:
         check_number("timestep", timestep)
         check_number("tolerance", tolerance)
@@ -81,7 +90,10 @@ class GedsHose(SplineBody):
         self._limits = solver.Limits(
             move, move / _TURN_TOLERANCE, max_iterations, np.inf, False, 0.0
         )
-        self._loads = LoadSet(self._spline, self._weight)
+        self._contacts = ContactSet(self._spline, spec, self.gravity, self._timestep)
+        self._loads = LoadSet(self._spline, self._weight, self._contacts.contact)
+        if len(obstacles) > 0:
+            self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
 
     # -- state -----------------------------------------------------------------------------------
@@ -138,6 +150,7 @@ class GedsHose(SplineBody):
             "steps": self._steps,
             "holds": self._holds.snapshot(),
             "loads": self._loads.snapshot(),
+            "contacts": self._contacts.snapshot(),
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
         }
@@ -157,6 +170,8 @@ class GedsHose(SplineBody):
         self._steps = state["steps"]
         self.iterations, self.fallbacks = state["iterations"], state["fallbacks"]
         self._loads.restore(state["loads"])
+        self._contacts.restore(state["contacts"])
+        self._loads.set_contact(self._contacts.contact)
         self._holds.restore(state["holds"], self._state.x)
         self._renew_work()
 
@@ -313,6 +328,8 @@ class GedsHose(SplineBody):
 
     def _start(self, director: Array | None = None) -> None:
         self._steps = 0
+        self._contacts.rebuild()
+        self._loads.set_contact(self._contacts.contact)
         self._loads.clear()
         self._holds.clear(self._state.x, director)
         self._renew_work()

@@ -25,8 +25,11 @@ from hose_mj.hoses.geds.band import (
     solve_upper,
 )
 from hose_mj.hoses.geds.basis import Tables
+from hose_mj.hoses.geds.contact import add_contact
+from hose_mj.hoses.geds.contact_law import TOLERANCE, Contact
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
+from hose_mj.hoses.geds.self_contact import add_self_contact
 from hose_mj.hoses.geds.span import Elasticity, Span, make_span
 from hose_mj.hoses.geds.twist import Twist, predict_twist
 from hose_mj.hoses.model import Array
@@ -80,19 +83,21 @@ class Holds(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Dead loads.
+    """Dead loads, and what may be touched.
 
     Attributes:
         force: generalised force on the control points, gravity included, flat (n d,).
         moment_start: index of the first of the 4 d unknowns at each point moment, (k,).
         moment_basis: N and dN/ds there, (k, 2, 4).
         moment: (k, 3) N m; a planar hose reads the first entry.
+        contact: obstacles; see contact.py.
     """
 
     force: Array
     moment_start: np.ndarray
     moment_basis: Array
     moment: Array
+    contact: Contact
 
 
 class Limits(NamedTuple):
@@ -249,7 +254,8 @@ def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
 def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
     """Fills work.gradient with the residual without holds, work.band with its derivative.
 
-    The twist's rank-one terms are not in the band: `solve_with_holds` adds them.
+    The twist's rank-one terms are not in the band: `solve_with_holds` adds them. Returns how many
+    contact points touch something.
     """
     h, X, V = stage
     size = len(x)
@@ -280,6 +286,11 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):  # 
     )
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
+    contact = loads.contact
+    add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
+    if contact.geoms.shape[0] + contact.given.shape[0] == 0:
+        return 0
+    return add_contact(axes, contact, x, work.rate, V, h, exact, work.gradient, work.band)
 
 
 @kernel
@@ -459,7 +470,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
     in_statics = limits.hold_weight > 0.0
     softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
     while True:
-        build(axes, hose, stage, holds.twist, fraction, loads, scale, exact, x, work)
+        touching = build(axes, hose, stage, holds.twist, fraction, loads, scale, exact, x, work)
         # Holds not yet met come first: the line search starts from a point that meets them.
         if limits.line_search and exact and iteration > 2 and shortened < 12:
             turned = 0.0
@@ -507,7 +518,10 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
         for k in range(size):
             x[k] += factor * work.step[k]
         predict_twist(holds.twist, factor, work.step)
-        if factor == 1.0 and largest <= limits.tolerance:
+        tolerance = limits.tolerance
+        if touching > 0:
+            tolerance = min(tolerance, loads.contact.law[TOLERANCE])
+        if factor == 1.0 and largest <= tolerance:
             return DONE, iteration, fallbacks
         if iteration == limits.max_iterations:
             return NOT_CONVERGED, iteration, fallbacks

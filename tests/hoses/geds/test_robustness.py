@@ -191,7 +191,7 @@ def test_snapshot_is_a_copy_of_plain_things():
     saved = hose.snapshot()
     kept = {path: np.copy(leaf) for path, leaf in flatten(saved) if leaf is not None}
     for path, leaf in flatten(saved):
-        assert type(leaf) in (np.ndarray, float, int, str, type(None)), path
+        assert type(leaf) in (np.ndarray, float, int, bool, str, type(None)), path
     hose.step(3)
     for path, leaf in flatten(saved):
         assert leaf is None or np.array_equal(leaf, kept[path]), path

@@ -1,0 +1,143 @@
+"""Obstacles that a hose may touch: MuJoCo's simple shapes, and the numbers of the contact law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.inputs import check_choice, check_count, check_vector
+from hose_mj.hoses.model import Array
+from hose_mj.hoses.spec import check_number
+
+KINDS = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
+"""Shapes, and how many of the three sizes each reads; a plane is infinite."""
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Obstacle:
+    """A rigid shape, placed as MuJoCo places a geom; everything in the world frame.
+
+    Attributes:
+        kind: plane (its z axis points out of the solid), sphere, capsule, cylinder (both along z)
+            or box.
+        position: of its centre (3,), m; a point of a plane.
+        rotation: (3, 3), the columns are its axes; as geom_xmat.
+        size: m: radius of a sphere; radius and half length of a capsule or cylinder; half lengths
+            of a box. What a shape does not read may be left out.
+        friction: Coulomb's coefficient against the hose.
+        velocity: of its position (3,), m/s; friction follows the surface.
+        angular_velocity: (3,), rad/s.
+
+    Raises:
+        InputError: an unknown kind, a size that is missing or not above zero, a rotation that is
+            not orthogonal and right-handed, or a number that is not finite.
+    """
+
+    kind: str
+    position: ArrayLike = _ZERO
+    rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
+    size: ArrayLike = ()
+    friction: float = 0.5
+    velocity: ArrayLike = _ZERO
+    angular_velocity: ArrayLike = _ZERO
+
+    def __post_init__(self) -> None:
+        check_choice("kind of obstacle", self.kind, list(KINDS))
+        check_number("friction", self.friction, may_be_zero=True)
+        for name in ("position", "velocity", "angular_velocity"):
+            object.__setattr__(self, name, _freeze(check_vector(name, getattr(self, name))))
+        object.__setattr__(self, "rotation", _freeze(_check_rotation(self.rotation)))
+        object.__setattr__(self, "size", _freeze(_check_size(self.kind, self.size)))
+
+    def find_bound(self) -> float:
+        """Radius of the ball about the position that holds the obstacle (m); inf for a plane."""
+        radius, half, _ = np.asarray(self.size)
+        if self.kind == "plane":
+            return float(np.inf)
+        if self.kind == "cylinder":
+            return float(np.hypot(radius, half))
+        return float(np.linalg.norm(self.size)) if self.kind == "box" else float(radius + half)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactLaw:
+    """How a hose and an obstacle push each other; None for a value chosen from the hose.
+
+    With g the gap between the surfaces, w the width and k the stiffness, the normal force per
+    length is 0 above g = w, k (w - g)^2 / (4 w) between w and -w, and -k g below: its slope is
+    continuous. Friction per length is friction times that, times v / sqrt(v^2 + slip_speed^2)
+    against the slip v: below the slip speed a hose creeps where Coulomb's law would hold it.
+
+    Attributes:
+        stiffness: k (N/m^2). By default the hose's own weight per length (at 9.81 m/s^2, or the
+            hose's gravity where that is more) sinks it by `SINK` of its radius.
+        width: w (m); by default the depth to which the weight sinks.
+        damping_time: the normal force grows by this times its slope times the closing speed (s),
+            and never pulls; by default critical, 2 sqrt(linear density / k).
+        slip_speed: m/s.
+        points_per_span: contact is looked for at so many points in each span of the spline; None
+            for 3, with self-contact for as many as bring them within a radius of each other.
+        self_contact: whether the hose may touch itself, without friction; its stiffness is tied to
+            the time step dt: 2 linear density / dt^2, see geds/self_contact.py.
+
+    Raises:
+        InputError: a value outside its range.
+    """
+
+    stiffness: float | None = None
+    width: float | None = None
+    damping_time: float | None = None
+    slip_speed: float = 1e-3
+    points_per_span: int | None = None
+    self_contact: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "width"):
+            if getattr(self, name) is not None:
+                check_number(f"contact {name}", getattr(self, name))
+        if self.damping_time is not None:
+            check_number("contact damping_time", self.damping_time, may_be_zero=True)
+        check_number("slip_speed", self.slip_speed)
+        if self.points_per_span is not None:
+            check_count("points_per_span", self.points_per_span, 1, MOST_POINTS)
+
+
+SINK = 0.003
+"""Depth to which a hose sinks into a floor under its own weight, by its radius."""
+MOST_POINTS = 16
+"""Contact points in a span at most."""
+
+
+def _freeze(array: Array) -> Array:
+    own = np.array(array, dtype=np.float64)
+    own.flags.writeable = False
+    return own
+
+
+def _check_rotation(rotation: ArrayLike) -> Array:
+    matrix = np.asarray(rotation, dtype=np.float64)
+    if matrix.shape == (9,):
+        matrix = matrix.reshape(3, 3)
+    right = matrix.shape == (3, 3) and bool(np.all(np.isfinite(matrix)))
+    if not (
+        right
+        and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
+        and np.linalg.det(matrix) > 0.0
+    ):
+        raise InputError("rotation", rotation, "an orthogonal, right-handed (3, 3) matrix")
+    return matrix
+
+
+def _check_size(kind: str, size: ArrayLike) -> Array:
+    """Returns three sizes, those that the kind does not read set to 0."""
+    given = np.atleast_1d(np.asarray(size, dtype=np.float64))
+    count = KINDS[kind]
+    if given.ndim != 1 or len(given) < count or not np.all(given[:count] > 0.0):
+        raise InputError(f"size of a {kind}", size, f"{count} finite numbers above 0 (m)")
+    if not np.all(np.isfinite(given[:count])):
+        raise InputError(f"size of a {kind}", size, f"{count} finite numbers above 0 (m)")
+    return np.concatenate([given[:count], np.zeros(3 - count)])

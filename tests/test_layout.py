@@ -25,8 +25,8 @@ FLOORS = {
     "hose_mj.hoses": {"hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses.spec"},
     "hose_mj.scenes": {"hose_mj.assets", "hose_mj.errors", "hose_mj.hoses.spec"},
     "hose_mj.validation": {
-        *("hose_mj.errors", "hose_mj.checks", "hose_mj.hoses", "hose_mj.hoses.spec"),
-        "hose_mj.scenes",
+        *("hose_mj.errors", "hose_mj.checks", "hose_mj.compiled", "hose_mj.hoses"),
+        *("hose_mj.hoses.spec", "hose_mj.scenes"),
     },
     "hose_mj.world": {"hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes"},
     "hose_mj.constraints": {

@@ -62,7 +62,7 @@ def test_a_rest_shape(capsys, tmp_path, mine):
     assert document["settings"]["my_hose"] == str(mine)
     assert {record["case"] for record in document["records"]} == {"own-hose"}
     assert {record["reference"] for record in document["records"]} == {"converged"}
-    assert {record["model"] for record in document["records"]} == {"geds", "cable"}
+    assert {record["model"] for record in document["records"]} == {"geds", "cable", "flex"}
     assert all(record["timestep"] is None for record in document["records"])
     assert document["ratios"] == document["skipped"] == []
     for answer in document["answers"]:

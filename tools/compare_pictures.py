@@ -232,12 +232,17 @@ def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
     of = "reference" if members[0].case.scale is None else "length"
     pictures = {family: plots.plot_errors(title, points, f"error (of the {of})")}
     case = members[0].case
-    if case.obstacles:
+    if case.obstacles or not case.planar:
         ours = max(members[0].outcomes, key=lambda outcome: outcome.setting.resolution)
-        curves = {describe_setting(ours): ours.points[0]}
-        plane = choose_plane(curves.values())
-        outlines = find_outlines(case.obstacles, plane)
-        pictures[f"{family}-shapes"] = plots.plot_shapes(title, curves, plane, outlines=outlines)
+        curve = ours.points[0]
+        plane = choose_plane([curve])
+        across = np.sort(np.ptp(curve, axis=0))
+        if across[1] > 0.01 * across[2]:  # a straight line is no picture
+            outlines = find_outlines(case.obstacles, plane)
+            curves = {describe_setting(ours): curve}
+            pictures[f"{family}-shapes"] = plots.plot_shapes(
+                title, curves, plane, outlines=outlines
+            )
     if family in FANS and len(members) > 1:
         fans = [_make_fan(members, "geds", None), _make_fan(members, "cable", False)]
         pictures[f"{family}-shapes"] = plots.plot_fan(title, [fan for fan in fans if fan])

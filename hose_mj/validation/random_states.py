@@ -37,15 +37,21 @@ def make_random_hose(rng: np.random.Generator) -> GedsHose:
 
     Shapes: control points displaced by up to 2 L, four of them coincident, the polygon folded back
     onto itself by 180 degrees, or a small disturbance. EA L^2 / EI from 1e2 to 1e8, time steps from
-    1e-4 to 2e-2 s, two forces of up to 100 weights; half of the hoses among obstacles.
+    1e-4 to 2e-2 s, two forces of up to 100 weights; half of the hoses among obstacles. In space
+    half of the hoses that are clamped are clamped at both ends and spun by up to a turn, and a
+    third are ribbons that are curved at rest.
     """
     stiffness = 0.05
     n = int(rng.choice([6, 8, 12, 16, 24]))
     plane = None if rng.random() < 0.5 else "xz"
+    is_ribbon = plane is None and rng.random() < 0.3
     spec = HoseSpec(
         length=1.0,
         axial_stiffness=float(10.0 ** rng.uniform(2.0, 8.0)) * stiffness,
         bending_stiffness=stiffness,
+        second_bending_stiffness=20.0 * stiffness if is_ribbon else None,
+        torsional_stiffness=0.8 * stiffness,
+        rest_curvature=float(rng.uniform(-5.0, 5.0)) if is_ribbon else 0.0,
         linear_density=0.1,
         damping_time=float(rng.choice([0.0, 0.0, 0.01])),
     )
@@ -59,6 +65,9 @@ def make_random_hose(rng: np.random.Generator) -> GedsHose:
     hose.set_control_points(_draw_polygon(hose.control_points, plane, rng))
     if rng.random() < 0.5:
         hose.clamp(0.0, tangent=(1.0, 0.0, 0.0))
+        if plane is None and rng.random() < 0.5:
+            far = hose.clamp(spec.length, tangent=rng.normal(size=3))
+            hose.move(far, spin=float(rng.uniform(-2.0, 2.0) * np.pi))
     if rng.random() < 0.5:
         hose.attach(float(rng.uniform(0.2, 1.0)))
     for _ in range(2):

@@ -31,8 +31,8 @@ REFERENCE_POINTS = 48
 """Control points of the references of the cases."""
 BUDGET_SPENT = "the budget was spent"
 """Why a run did not start any more."""
-N_DRAWN = 41
-"""Points along the hose that are kept for pictures."""
+N_DRAWN, N_DRAWN_IN_SPACE = 41, 601
+"""Points along the hose that are kept for pictures; a coil needs more."""
 
 
 @dataclass
@@ -48,7 +48,7 @@ class Outcome:
         sim_s: simulated time (s); None in statics.
         fallbacks: of the solver.
         times: sampled instants (k,).
-        points: centre lines at those instants, (k, N_DRAWN, 3).
+        points: centre lines at those instants, (k, N_DRAWN or N_DRAWN_IN_SPACE, 3).
         values: the probe at those instants, (k, q).
     """
 
@@ -352,7 +352,8 @@ def _advance(motion: Motion, hose: HoseModel, holds: list[Hold], begun: int, n_s
 
 
 def _drawn(case: Case) -> Array:
-    return np.linspace(0.0, case.spec.length, N_DRAWN)
+    n_drawn = N_DRAWN if case.planar else N_DRAWN_IN_SPACE
+    return np.linspace(0.0, case.spec.length, n_drawn)
 
 
 def _count_fallbacks(hose: HoseModel) -> int:

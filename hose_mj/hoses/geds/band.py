@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined, kernel
 
 
 @kernel
@@ -28,7 +28,7 @@ def factorize(axes, size, band):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inlined
 def _eliminate(axes, j, sign, band):  # type: ignore[no-untyped-def]
     """Subtracts sign times column j's outer product from the columns after it.
 
@@ -43,7 +43,7 @@ def _eliminate(axes, j, sign, band):  # type: ignore[no-untyped-def]
         _eliminate_from(j, 12, 16, width - 12, sign, band)
 
 
-@kernel
+@inlined
 def _eliminate_from(j, first, end, length, sign, band):  # type: ignore[no-untyped-def]
     """`_eliminate` for columns j + first to j + end - 1."""
     for k in range(first, end):

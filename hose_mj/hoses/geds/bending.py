@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined
 from hose_mj.hoses.geds.span import compute_inverse_square
 
 
-@kernel
+@inlined
 def set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped-def]
     """Sets force and stiffness of Gauss point g to `weight` (EI times length) times bending.
 
@@ -61,7 +61,7 @@ def set_bending(axes, g, weight, exact, viscous, p):  # type: ignore[no-untyped-
             entry[c1, c2, 9 + g] = both * (A * unit - aa)
 
 
-@kernel
+@inlined
 def add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
     """Adds the viscous force of bending, `weight` (EI tau times length) J^T J (a_rate, b_rate)."""
     a = p.a
@@ -103,7 +103,7 @@ def add_bending_viscosity(axes, g, weight, p):  # type: ignore[no-untyped-def]
         )
 
 
-@kernel
+@inlined
 def add_rest_curvature(g, weight, exact, p):  # type: ignore[no-untyped-def]
     """Adds `weight` (minus EI kappa_0 times length) times the signed curvature (planar hose)."""
     a = (p.a[g, 0], p.a[g, 1])

@@ -143,7 +143,7 @@ def _rub(m, n, v, w, c):  # type: ignore[no-untyped-def]
 def scatter(axes, points, q, start, force, m, gradient, band):  # type: ignore[no-untyped-def]
     """Adds a force at contact point q and its stiffness m to the span's unknowns."""
     d = len(axes)
-    n_coordinates = min(d, 3)
+    n_coordinates = len(axes[:3])
     rows = ((m[0], m[3], m[4]), (m[3], m[1], m[5]), (m[4], m[5], m[2]))
     for i in range(4):
         for c in range(n_coordinates):

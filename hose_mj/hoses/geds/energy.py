@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
 from hose_mj.hoses.geds.frames import move_clamp_frames
 from hose_mj.hoses.geds.rod import compute_rod_strains, set_rod
@@ -81,30 +81,30 @@ def compute_energy(axes, tables, elasticity, frames, x, p, strains):  # type: ig
     return stretching, bending, twisting
 
 
-@kernel
+@inlined
 def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped-def]
     """Adds force and, scaled by `exact`, geometric stiffness of a tension (N) at Gauss point g."""
     a = p.a
     slope = 2.0 * weight * tension * p.stretches[g, 1]
     unit = 2.0 * weight * exact * tension * p.stretches[g, 1]
     bend = 4.0 * weight * exact * tension * p.stretches[g, 2]
-    for c1 in range(min(len(axes), 3)):
+    for c1 in range(len(axes[:3])):
         p.force[g, 0, c1] += slope * a[g, c1]
         for c2 in range(c1 + 1):
             p.stiffness[c1, c2, g] += bend * a[g, c1] * a[g, c2] + (unit if c1 == c2 else 0.0)
 
 
-@kernel
+@inlined
 def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # type: ignore[no-untyped-def]
     """Adds the span's force to the gradient and its stiffness to the band."""
     d = len(axes)
     start = e * d
-    for c in range(min(d, 3)):
+    for c in range(len(axes[:3])):
         _scatter_force(tables.first, tables.second, e, d, c, p, gradient)
     block = p.block
     q = tables.products
     s = p.stiffness
-    for c1 in range(min(d, 3)):
+    for c1 in range(len(axes[:3])):
         for c2 in range(c1 + 1):
             s0, s1, s2, s3 = s[c1, c2, 0], s[c1, c2, 1], s[c1, c2, 2], s[c1, c2, 3]
             s4, s5, s6, s7 = s[c1, c2, 4], s[c1, c2, 5], s[c1, c2, 6], s[c1, c2, 7]
@@ -126,7 +126,7 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
         _scatter_turn(tables, e, p, band)
 
 
-@kernel
+@inlined
 def _scatter_force(by_a, by_b, e, d, c, p, gradient):  # type: ignore[no-untyped-def]
     """Adds the force on unknown c of the span's control points, a and b made with these tables."""
     a0, a1, a2 = p.force[0, 0, c], p.force[1, 0, c], p.force[2, 0, c]
@@ -137,7 +137,7 @@ def _scatter_force(by_a, by_b, e, d, c, p, gradient):  # type: ignore[no-untyped
         gradient[(e + i) * d + c] += along + across
 
 
-@kernel
+@inlined
 def _add_block(d, start, c1, c2, block, band):  # type: ignore[no-untyped-def]
     """Adds the block (16,) of unknowns c1 >= c2 of four control points to the band."""
     for i in range(4):
@@ -149,7 +149,7 @@ def _add_block(d, start, c1, c2, block, band):  # type: ignore[no-untyped-def]
                 band[start + i * d + c1, (j - i) * d + c2 - c1] += block[4 * i + j]
 
 
-@kernel
+@inlined
 def _scatter_turn(tables, e, p, band):  # type: ignore[no-untyped-def]
     """Adds the stiffness of theta, alone and with the place, to the band."""
     block = p.block
@@ -174,7 +174,7 @@ def _scatter_turn(tables, e, p, band):  # type: ignore[no-untyped-def]
     _add_block(4, 4 * e, 3, 3, block, band)
 
 
-@kernel
+@inlined
 def _add_outer(mode, c1, c2, axial, p):  # type: ignore[no-untyped-def]
     """Adds a strain mode's rank-one stiffness to the block of coordinates c1, c2."""
     m0, m1 = p.modes[mode, c2, 0], p.modes[mode, c2, 1]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
+from hose_mj.compiled import compiled, inlined, kernel
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.rod import move_frame
 from hose_mj.hoses.geds.span import compute_derivatives
@@ -83,7 +83,7 @@ def shift_clamps(twist, progress, shift):  # type: ignore[no-untyped-def]
         shift[twist.turn_rows[clamp]] += progress * twist.spin[clamp, 0] + angle
 
 
-@kernel
+@inlined
 def _compute_angle(t0, t1, t2, d0, d1, d2, e0, e1, e2):  # type: ignore[no-untyped-def]
     """Angle from d to e about t, right-handed, in (-pi, pi]."""
     across = t0 * (d1 * e2 - d2 * e1) + t1 * (d2 * e0 - d0 * e2) + t2 * (d0 * e1 - d1 * e0)
@@ -142,7 +142,7 @@ def lay_frames(axes, tables, twist, x, p, frames):  # type: ignore[no-untyped-de
             frames[3 * e + g, 9] = 0.0
 
 
-@kernel
+@inlined
 def _compute_first_tangent(x):  # type: ignore[no-untyped-def]
     """Unit tangent where the hose begins: from the first control point to the second."""
     t0, t1, t2 = x[4] - x[0], x[5] - x[1], x[6] - x[2]
@@ -150,7 +150,7 @@ def _compute_first_tangent(x):  # type: ignore[no-untyped-def]
     return t0 * inverse, t1 * inverse, t2 * inverse
 
 
-@kernel
+@inlined
 def _integrate_turn(tables, frames, e, end):  # type: ignore[no-untyped-def]
     """Integral of what stands in the frames' last column from the span's start to `end` (-1 to 1).
 
@@ -162,7 +162,7 @@ def _integrate_turn(tables, frames, e, end):  # type: ignore[no-untyped-def]
     return 0.5 * tables.span_length * whole
 
 
-@kernel
+@inlined
 def _turn(t0, t1, t2, d0, d1, d2, angle):  # type: ignore[no-untyped-def]
     """The director d, normal to the unit vector t, turned by an angle about it."""
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -170,7 +170,7 @@ def _turn(t0, t1, t2, d0, d1, d2, angle):  # type: ignore[no-untyped-def]
     return cosine * d0 + sine * e0, cosine * d1 + sine * e1, cosine * d2 + sine * e2
 
 
-@kernel
+@inlined
 def _find_gauss_point(tables, n_spans, place):  # type: ignore[no-untyped-def]
     """The Gauss point that is nearest to a place (in spans from the start)."""
     e = min(int(place), n_spans - 1)
@@ -230,7 +230,7 @@ def lay_anew(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
     twist.frames[:] = fresh
 
 
-@kernel
+@inlined
 def _unwrap(angle, near):  # type: ignore[no-untyped-def]
     """The angle plus the whole turns that bring it closest to another one."""
     return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))

@@ -26,14 +26,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined
 from hose_mj.hoses.geds.span import SMALLEST_A
 
 TANGENT, SLOPE, DIRECTOR, RATE = 0, 3, 6, 9
 """Where a row of the frames (F, 10) has t, t', d and m."""
 
 
-@kernel
+@inlined
 def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     """Takes frame f along to a new a = r' and b = r''."""
     inverse = 1.0 / np.sqrt(max(a0 * a0 + a1 * a1 + a2 * a2, SMALLEST_A))
@@ -58,7 +58,7 @@ def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-de
     frames[f, 3], frames[f, 4], frames[f, 5] = s0, s1, s2
 
 
-@kernel
+@inlined
 def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
     """Moves the frame of Gauss point g and returns K1, K2 and the twist there.
 
@@ -104,7 +104,7 @@ def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
     return first, second, p.a[g, 3] + frames[f, 9]
 
 
-@kernel
+@inlined
 def set_rod(elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[no-untyped-def]
     """Sets force and stiffness of Gauss point g of span e, Kelvin-Voigt terms included.
 
@@ -162,7 +162,7 @@ def set_rod(elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[n
         _add_second_derivatives(frames, f, g, s0, s1, s2, p)
 
 
-@kernel
+@inlined
 def _add_second_derivatives(frames, f, g, s0, s1, s2, p):  # type: ignore[no-untyped-def]
     """Adds what stresses s0, s1, s2 times the strains' second derivatives make (see above)."""
     a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]

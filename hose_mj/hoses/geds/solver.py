@@ -212,7 +212,7 @@ def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
     lies along the tangent acts on theta where there is one.
     """
     d = len(axes)
-    n_places = min(d, 3)
+    n_places = len(axes[:3])
     a = work.span.a[0]
     turn = work.span.b[0]
     for k in range(len(loads.moment_start)):
@@ -427,7 +427,7 @@ def _largest_turn(axes, tables, x, shift):  # type: ignore[no-untyped-def]
             A = 0.0
             square = 0.0
             along = 0.0
-            for c in range(min(d, 3)):
+            for c in range(len(axes[:3])):
                 a = 0.0
                 move = 0.0
                 for i in range(4):

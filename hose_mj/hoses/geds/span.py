@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
+from hose_mj.compiled import compiled, inlined
 from hose_mj.hoses.model import Array
 
 SMALLEST_A = 0.01
@@ -89,7 +89,7 @@ def make_span():  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@inlined
 def compute_stretch(A):  # type: ignore[no-untyped-def]
     """|a| and its first two derivatives by A."""
     if A >= SMALLEST_A:
@@ -105,7 +105,7 @@ def compute_stretch(A):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@inlined
 def compute_inverse_square(A):  # type: ignore[no-untyped-def]
     """P = 1 / A^2, s = P' / (2 P) and P'' (derivatives by A)."""
     if A >= SMALLEST_A:
@@ -125,7 +125,7 @@ def compute_inverse_square(A):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@inlined
 def compute_derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped-def]
     """Writes a[g] = r' and b[g] = r'' at Gauss point g of span e; returns A, B, C.
 
@@ -140,7 +140,7 @@ def compute_derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped
     A = 0.0
     B = 0.0
     C = 0.0
-    for c in range(min(d, 3)):
+    for c in range(len(axes[:3])):
         k = e * d + c
         x0, x1, x2, x3 = x[k], x[k + d], x[k + 2 * d], x[k + 3 * d]
         ac = f0 * x0 + f1 * x1 + f2 * x2 + f3 * x3
@@ -163,7 +163,7 @@ def compute_derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped
     return A, B, C
 
 
-@kernel
+@inlined
 def load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
     """Computes r', r'', |r'| and the derivatives of the two strain modes of span e."""
     for g in range(3):
@@ -172,7 +172,7 @@ def load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
         p.stretches[g, 0] = stretch
         p.stretches[g, 1] = slope
         p.stretches[g, 2] = bend
-    for c in range(min(len(axes), 3)):
+    for c in range(len(axes[:3])):
         t0 = 2.0 * tables.weights[0] * p.stretches[0, 1] * p.a[0, c]
         t1 = 2.0 * tables.weights[1] * p.stretches[1, 1] * p.a[1, c]
         t2 = 2.0 * tables.weights[2] * p.stretches[2, 1] * p.a[2, c]
@@ -183,14 +183,14 @@ def load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
             p.modes[1, c, i] = l0 * f0 + l1 * f1 + l2 * f2
 
 
-@kernel
+@inlined
 def load_rates(axes, tables, e, rate, p):  # type: ignore[no-untyped-def]
     """Computes the rates of r' and r'' at span e; returns those of the two strain modes."""
     mean = 0.0
     linear = 0.0
     for g in range(3):
         compute_derivatives(axes, tables, e, g, rate, p.a_rate, p.b_rate)
-    for c in range(min(len(axes), 3)):
+    for c in range(len(axes[:3])):
         for i in range(4):
             speed = rate[(e + i) * len(axes) + c]
             mean += p.modes[0, c, i] * speed

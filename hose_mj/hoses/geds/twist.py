@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.span import compute_derivatives
 from hose_mj.hoses.model import Array
 
@@ -72,7 +72,7 @@ class Twist(NamedTuple):
     rows: Array
 
 
-@kernel
+@inlined
 def compute_tangent(axes, start, slopes, row, x):  # type: ignore[no-untyped-def]
     """Unit tangent from the four control points whose first unknown is `start`."""
     d = len(axes)
@@ -86,7 +86,7 @@ def compute_tangent(axes, start, slopes, row, x):  # type: ignore[no-untyped-def
     return t0 * inverse, t1 * inverse, t2 * inverse
 
 
-@kernel
+@inlined
 def carry(u0, u1, u2, v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
     """The director d, normal to u, after the smallest rotation that takes u to v (unit vectors)."""
     cosine = u0 * v0 + u1 * v1 + u2 * v2
@@ -94,7 +94,7 @@ def carry(u0, u1, u2, v0, v1, v2, d0, d1, d2):  # type: ignore[no-untyped-def]
     return d0 - factor * (u0 + v0), d1 - factor * (u1 + v1), d2 - factor * (u2 + v2)
 
 
-@kernel
+@inlined
 def carry_clamp(directors, clamp, t0, t1, t2):  # type: ignore[no-untyped-def]
     """The director of a clamp after the smallest rotation of its tangent to t."""
     d = directors
@@ -110,7 +110,7 @@ def start_twist(twist):  # type: ignore[no-untyped-def]
         twist.torque[k] = twist.angle[k] / twist.compliance[k]
 
 
-@kernel
+@inlined
 def open_stretches(axes, twist, x):  # type: ignore[no-untyped-def]
     """Puts the director of each stretch's first clamp where the tangent now is there."""
     for k in range(len(twist.angle)):
@@ -124,7 +124,7 @@ def open_stretches(axes, twist, x):  # type: ignore[no-untyped-def]
             twist.rows[k, i] = 0.0
 
 
-@kernel
+@inlined
 def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-def]
     """Carries the directors through span e and adds what twist does there.
 
@@ -186,7 +186,7 @@ def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-d
         twist.carried[k, 6] += total
 
 
-@kernel
+@inlined
 def find_angle(twist, k, near):  # type: ignore[no-untyped-def]
     """Sets twist.trial of stretch k, whose director has come to the last clamp.
 

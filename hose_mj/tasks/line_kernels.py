@@ -79,14 +79,14 @@ def look_up(table, i, j):  # type: ignore[no-untyped-def]
 
 @jitable
 def get_x(state, point):  # type: ignore[no-untyped-def]
-    """Returns x of a robot or the source."""
-    return state[HEADER + 2 * point]
+    """Returns x of a robot or the source; for the unsigned index see `look_up`."""
+    return state[np.uint64(HEADER + 2 * point)]
 
 
 @jitable
 def get_y(state, point):  # type: ignore[no-untyped-def]
     """Returns y of a robot or the source."""
-    return state[HEADER + 2 * point + 1]
+    return state[np.uint64(HEADER + 2 * point + 1)]
 
 
 @jitable

@@ -25,6 +25,8 @@ from hose_mj.tasks.stream import draw_below
 def fits(record, state, robot):  # type: ignore[no-untyped-def]
     """Whether the robot and its segment agree with the robots nearer to the source."""
     x, y = get_x(state, robot), get_y(state, robot)
+    if not is_inside(record, x, y):
+        return False
     hose_blocks = record.collision != ROBOTS
     covered = 0
     for other in range(robot + 1, record.n_robots):
@@ -32,7 +34,7 @@ def fits(record, state, robot):  # type: ignore[no-untyped-def]
     for other in range(robot + 2, record.n_robots if hose_blocks else 0):
         ox, oy = get_x(state, other), get_y(state, other)
         covered |= find_covered_by(record, state, robot, robot + 1, ox, oy)
-    return is_inside(record, x, y) & ((covered >> NONE & 1) == 0)
+    return (covered >> NONE & 1) == 0
 
 
 @jitable

@@ -49,7 +49,8 @@ def dispatched(function: Callable[..., Any]) -> Any:
     """
     function = functools.singledispatch(function)
 
-    @overload(function)
+    # Inlined: a call would copy all fields of the record onto the stack, at every move.
+    @overload(function, jit_options={"forceinline": True})
     def choose(record, *arguments):  # type: ignore[no-untyped-def]
         implementation = function.dispatch(record.instance_class)
 
@@ -213,14 +214,19 @@ def run_random(record, state, stream, n_moves, values, counts):  # type: ignore[
         values: work array of the observed values (n_variables,).
         counts: raised in place: episodes ended, successes, violations, sum of all values (4,).
     """
+    episodes = successes = violations = total = 0
     for _ in range(n_moves):
         agent = state[TURN]
         observe(record, state, agent, values)
         for value in values:
-            counts[3] += value
+            total += value
         events = apply(record, state, agent, draw_below(stream, record.n_actions))
-        counts[1] += events & record.success != 0
-        counts[2] += events & record.violations != 0
+        successes += events & record.success != 0
+        violations += events & record.violations != 0
         if is_over(record, events) or is_cut_off(record, state):
-            counts[0] += 1
+            episodes += 1
             reset(record, state, stream)
+    counts[0] += episodes
+    counts[1] += successes
+    counts[2] += violations
+    counts[3] += total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal, cast
@@ -16,8 +17,10 @@ from hose_mj.tasks import line_moves, line_observe, line_starts  # noqa: F401
 from hose_mj.tasks.checks import check_cell, check_cells, check_choice, check_finite, check_integer
 from hose_mj.tasks.kernels import HEADER, Integers
 from hose_mj.tasks.line_geometry import (
+    LARGEST_REACH,
     N_DIRECTIONS,
     list_offsets,
+    make_cover_table,
     make_direction_table,
     make_distance_table,
     make_offset_table,
@@ -130,6 +133,7 @@ def make_line(settings: LineSettings) -> Task:
     success = rules.ALL_GOALS if settings.own_goals else rules.GOAL
     largest_square = settings.hose_length**2 // n**2
     offsets = list_offsets(largest_square)
+    cover_reach = min(math.isqrt(largest_square), LARGEST_REACH)
     reach = 2 * settings.half_width
     levels = N_SQUARES if settings.own_goals else N_DISTANCES
     record = rules.Line(
@@ -150,6 +154,8 @@ def make_line(settings: LineSettings) -> Task:
         largest_square=largest_square,
         offsets=offsets,
         offset_table=make_offset_table(offsets),
+        cover_reach=cover_reach,
+        cover_table=make_cover_table(cover_reach),
         random_start=settings.start == "random",
         starts=_read_cells(settings.start, n),
         goal_mode={"random": rules.RANDOM, "none": rules.ABSENT}.get(

@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from hose_mj.compiled import jitable
 from hose_mj.tasks.kernels import Integers
 
+Bytes = npt.NDArray[np.uint8]
+
+UP, DOWN, LEFT, RIGHT, NONE = range(5)
 N_DIRECTIONS = 8
+LARGEST_REACH = 8
+"""Longest segment along an axis that a cover table is made for; it has 127,449 entries then."""
 MARGIN = 2
 """How much farther than its limit one joint move can stretch a segment, in cells along an axis."""
 
@@ -21,11 +27,45 @@ def covers(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
     They are apart exactly if an axis separates them: x, y, or the segment's normal, along which the
     segment is one number and the square reaches (|dx| + |dy|) / 2 to both sides of its centre.
     """
-    if x < min(ax, bx) or x > max(ax, bx) or y < min(ay, by) or y > max(ay, by):
-        return False
     dx, dy = bx - ax, by - ay
     reach = abs(dx) + abs(dy)
-    return reach == 0 or 2 * abs(dx * (y - ay) - dy * (x - ax)) < reach
+    return (
+        (abs(2 * x - ax - bx) <= abs(dx))
+        & (abs(2 * y - ay - by) <= abs(dy))
+        & (2 * abs(dx * (y - ay) - dy * (x - ax)) < reach + (reach == 0))
+    )
+
+
+@jitable
+def find_covered(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
+    """Returns which of the cells that the actions lead to from (x, y) a segment covers.
+
+    Bit a is the cell of action a; bit NONE is (x, y) itself. Whole arrays will do as well.
+    """
+    return (
+        covers(ax, ay, bx, by, x, y + 1) << UP
+        | covers(ax, ay, bx, by, x, y - 1) << DOWN
+        | covers(ax, ay, bx, by, x - 1, y) << LEFT
+        | covers(ax, ay, bx, by, x + 1, y) << RIGHT
+        | covers(ax, ay, bx, by, x, y) << NONE
+    )
+
+
+def make_cover_table(reach: int) -> Bytes:
+    """Makes the table of what `find_covered` finds for short segments, from a to b.
+
+    Args:
+        reach: m, the longest segment in it, in cells along an axis.
+
+    Returns:
+        ((2 m + 1)^2, (2 m + 5)^2), by b - a and by the cell's place relative to a: row dx (2 m + 1)
+        + dy and column x (2 m + 5) + y, counted from their middles. What lies beyond the columns is
+        covered no more than the outermost ones, which are zero.
+    """
+    m = reach
+    dx, dy, x, y = np.ogrid[-m : m + 1, -m : m + 1, -m - 2 : m + 3, -m - 2 : m + 3]
+    covered = find_covered(0, 0, dx, dy, x, y).astype(np.uint8)
+    return np.ascontiguousarray(covered.reshape((2 * m + 1) ** 2, (2 * m + 5) ** 2))
 
 
 def list_offsets(largest_square: int) -> Integers:

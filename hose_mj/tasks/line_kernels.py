@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from hose_mj.compiled import jitable
 from hose_mj.tasks.kernels import HEADER, Floats, Integers
-from hose_mj.tasks.line_geometry import covers
+from hose_mj.tasks.line_geometry import DOWN, LEFT, NONE, RIGHT, UP, Bytes, find_covered
 
 OUT, STRETCH, COLLISION, GOAL, ALL_GOALS = 1, 2, 4, 8, 16
-UP, DOWN, LEFT, RIGHT, NONE = range(5)
 ENTERING, SWEEPING, ROBOTS = 0, 1, 2
 """Collision rules: entering a held or covered cell, any robot being on one, robots alone."""
 FIXED, RANDOM, ABSENT = 0, 1, 2
@@ -33,6 +34,7 @@ class Line(NamedTuple):
         largest_square: square of the longest segment, L_s^2 rounded down.
         offsets: offsets allowed between neighbours (k, 2).
         offset_table: their numbers, see `line_geometry.make_offset_table`.
+        cover_reach, cover_table: m and the table of `line_geometry.make_cover_table`.
         random_start: whether the robots' first cells are drawn from the feasible set.
         starts: their first cells otherwise (N, 2).
         goal_mode: FIXED, RANDOM or ABSENT.
@@ -58,6 +60,8 @@ class Line(NamedTuple):
     largest_square: int
     offsets: Integers
     offset_table: Integers
+    cover_reach: int
+    cover_table: Bytes
     random_start: bool
     starts: Integers
     goal_mode: int
@@ -68,15 +72,21 @@ class Line(NamedTuple):
 
 
 @jitable
+def look_up(table, i, j):  # type: ignore[no-untyped-def]
+    """Returns table[i, j]; unsigned, the indices need no test for counting from the end."""
+    return table[np.uint64(i), np.uint64(j)]
+
+
+@jitable
 def get_x(state, point):  # type: ignore[no-untyped-def]
-    """Returns x of a robot or the source."""
-    return state[HEADER + 2 * point]
+    """Returns x of a robot or the source; for the unsigned index see `look_up`."""
+    return state[np.uint64(HEADER + 2 * point)]
 
 
 @jitable
 def get_y(state, point):  # type: ignore[no-untyped-def]
     """Returns y of a robot or the source."""
-    return state[HEADER + 2 * point + 1]
+    return state[np.uint64(HEADER + 2 * point + 1)]
 
 
 @jitable
@@ -84,6 +94,12 @@ def put(state, point, x, y):  # type: ignore[no-untyped-def]
     """Puts a robot, or with point = N + 1 + k goal k, on a cell."""
     state[HEADER + 2 * point] = x
     state[HEADER + 2 * point + 1] = y
+
+
+@jitable
+def clip(value, bound):  # type: ignore[no-untyped-def]
+    """Returns the nearest value in [-bound, bound]."""
+    return min(max(value, -bound), bound)
 
 
 @jitable
@@ -101,7 +117,7 @@ def step_y(action):  # type: ignore[no-untyped-def]
 @jitable
 def is_inside(record, x, y):  # type: ignore[no-untyped-def]
     """Whether a cell is on the grid."""
-    return abs(x) <= record.half_width and abs(y) <= record.half_width
+    return max(abs(x), abs(y)) <= record.half_width
 
 
 @jitable
@@ -114,22 +130,33 @@ def is_held(record, state, robot, x, y):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def is_covered(state, segment, x, y):  # type: ignore[no-untyped-def]
-    """Whether the segment covers the cell."""
-    ax, ay = get_x(state, segment), get_y(state, segment)
-    return covers(ax, ay, get_x(state, segment + 1), get_y(state, segment + 1), x, y)
+def find_covered_by(record, state, start, end, x, y):  # type: ignore[no-untyped-def]
+    """Returns `line_geometry.find_covered` for the straight line from one point to another."""
+    ax, ay, bx, by = get_x(state, start), get_y(state, start), get_x(state, end), get_y(state, end)
+    dx, dy = bx - ax, by - ay
+    m = record.cover_reach
+    if max(abs(dx), abs(dy)) > m:
+        return find_covered(ax, ay, bx, by, x, y)
+    to_x, to_y = clip(x - ax, m + 2), clip(y - ay, m + 2)
+    segment = (dx + m) * (2 * m + 1) + dy + m
+    cell = (to_x + m + 2) * (2 * m + 5) + to_y + m + 2
+    return np.int64(look_up(record.cover_table, segment, cell))
 
 
 @jitable
-def is_blocked(record, state, robot, x, y):  # type: ignore[no-untyped-def]
-    """Whether another robot holds the cell or a segment that the robot does not end covers it."""
-    if is_held(record, state, robot, x, y):
-        return True
-    if record.collision != ROBOTS:
-        for segment in range(record.n_robots):
-            if segment != robot and segment + 1 != robot and is_covered(state, segment, x, y):
-                return True
-    return False
+def find_blocked(record, state, robot):  # type: ignore[no-untyped-def]
+    """Returns which of the cells that the actions lead to are blocked for the robot.
+
+    Bit a is the cell of action a. Another robot blocks its cell, and so does the segment behind it
+    those it covers, unless the robot itself is at the segment's end or no segment ever blocks.
+    """
+    x, y = get_x(state, robot), get_y(state, robot)
+    blocked = 0
+    for k in range(record.n_robots - 1):
+        other = k + (k >= robot)
+        end = other + ((record.collision != ROBOTS) & (other + 1 != robot))
+        blocked |= find_covered_by(record, state, other, end, x, y)
+    return blocked
 
 
 @jitable
@@ -143,15 +170,13 @@ def is_too_long(record, state, segment):  # type: ignore[no-untyped-def]
 @jitable
 def is_stretched(record, state, robot):  # type: ignore[no-untyped-def]
     """Whether a segment that the robot ends is longer than L_s."""
-    return is_too_long(record, state, robot) or (
-        robot > 0 and is_too_long(record, state, robot - 1)
-    )
+    return is_too_long(record, state, robot) | is_too_long(record, state, max(robot - 1, 0))
 
 
 @jitable
 def is_in_the_way(record, state, robot):  # type: ignore[no-untyped-def]
     """Whether the robot stands where it should not: with another one, or on the hose."""
-    return is_blocked(record, state, robot, get_x(state, robot), get_y(state, robot))
+    return (find_blocked(record, state, robot) >> NONE & 1) == 1
 
 
 @jitable

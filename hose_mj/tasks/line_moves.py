@@ -5,12 +5,12 @@ from __future__ import annotations
 from hose_mj.compiled import inlined, jitable
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import end_joint, end_turn
+from hose_mj.tasks.line_geometry import NONE
 from hose_mj.tasks.line_kernels import (
     ABSENT,
     ALL_GOALS,
     COLLISION,
     GOAL,
-    NONE,
     OUT,
     STRETCH,
     SWEEPING,
@@ -31,14 +31,13 @@ from hose_mj.tasks.line_kernels import (
 @jitable
 def find_breaks(record, state, robot, moved):  # type: ignore[no-untyped-def]
     """Returns the constraints that the robot breaks, having moved to another cell or not."""
-    events = 0
-    if not is_inside(record, get_x(state, robot), get_y(state, robot)):
-        events |= OUT
-    if is_stretched(record, state, robot):
-        events |= STRETCH
-    if (moved or record.collision == SWEEPING) and is_in_the_way(record, state, robot):
-        events |= COLLISION
-    return events
+    inside = is_inside(record, get_x(state, robot), get_y(state, robot))
+    looks = moved | (record.collision == SWEEPING)
+    return (
+        OUT * (not inside)
+        | STRETCH * is_stretched(record, state, robot)
+        | COLLISION * (looks & is_in_the_way(record, state, robot))
+    )
 
 
 @jitable

@@ -4,31 +4,27 @@ from __future__ import annotations
 
 from hose_mj.compiled import inlined, jitable
 from hose_mj.tasks import kernels
+from hose_mj.tasks.line_geometry import NONE
 from hose_mj.tasks.line_kernels import (
-    NONE,
     Line,
+    clip,
+    find_blocked,
     get_x,
     get_y,
-    is_blocked,
     is_inside,
+    look_up,
     step_x,
     step_y,
 )
 
 
 @jitable
-def clip(value, bound):  # type: ignore[no-untyped-def]
-    """Returns the nearest value in [-bound, bound]."""
-    return min(max(value, -bound), bound)
-
-
-@jitable
-def number_offset(record, state, segment):  # type: ignore[no-untyped-def]
-    """Returns the number of P_j - P_(j+1) among the offsets that the hose allows."""
+def number_offset(record, state, point, behind):  # type: ignore[no-untyped-def]
+    """Returns the number of the point's place relative to the one behind it, or to itself."""
     m = record.offset_table.shape[0] // 2
-    dx = clip(get_x(state, segment) - get_x(state, segment + 1), m)
-    dy = clip(get_y(state, segment) - get_y(state, segment + 1), m)
-    return record.offset_table[dx + m, dy + m]
+    dx = clip(get_x(state, point) - get_x(state, behind), m)
+    dy = clip(get_y(state, point) - get_y(state, behind), m)
+    return look_up(record.offset_table, dx + m, dy + m)
 
 
 @jitable
@@ -38,27 +34,26 @@ def number_cell(record, x, y):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def observe_robot(record, state, robot, values, at):  # type: ignore[no-untyped-def]
-    """Writes p, r_g, d_g, theta_g, r_n, r_p and the four flags of a robot, from place `at` on."""
+def observe_robot(record, state, robot, ahead, behind, values, at):  # type: ignore[no-untyped-def]
+    """Writes p, r_g, d_g, theta_g, r_n, r_p and the four flags of a robot, from place `at` on.
+
+    Of these r_n and r_p, `ahead` and `behind`, are known already.
+    """
     h = record.half_width
-    x, y = get_x(state, robot), get_y(state, robot)
-    px, py = clip(x, h), clip(y, h)
+    px, py = clip(get_x(state, robot), h), clip(get_y(state, robot), h)
     goal = record.n_robots + 1 + (robot if record.own_goals else 0)
     gx, gy = get_x(state, goal) - px + 2 * h, get_y(state, goal) - py + 2 * h
     values[at] = number_cell(record, px, py)
     values[at + 1] = gx * (4 * h + 1) + gy
-    values[at + 2] = record.distance_table[gx, gy]
-    values[at + 3] = record.direction_table[gx, gy]
-    zero = record.offset_table.shape[0] // 2
-    values[at + 4] = record.offset_table[zero, zero]
-    if robot > 0:
-        values[at + 4] = number_offset(record, state, robot - 1)
-    values[at + 5] = number_offset(record, state, robot)
+    values[at + 2] = look_up(record.distance_table, gx, gy)
+    values[at + 3] = look_up(record.direction_table, gx, gy)
+    values[at + 4] = ahead
+    values[at + 5] = behind
+    blocked = find_blocked(record, state, robot)
+    x, y = get_x(state, robot), get_y(state, robot)
     for action in range(NONE):
-        to_x, to_y = x + step_x(action), y + step_y(action)
-        values[at + 6 + action] = is_inside(record, to_x, to_y) and is_blocked(
-            record, state, robot, to_x, to_y
-        )
+        inside = is_inside(record, x + step_x(action), y + step_y(action))
+        values[at + 6 + action] = inside & (blocked >> action & 1)
 
 
 @kernels.observe.register(Line)
@@ -68,12 +63,18 @@ def observe_line(record, state, agent, values):  # type: ignore[no-untyped-def]
     goal = record.n_robots + 1 + (agent if record.own_goals else 0)
     values[0] = number_cell(record, get_x(state, goal), get_y(state, goal))
     at = 1
+    ahead = number_offset(record, state, 0, 0)
     if record.single_agent:
         for robot in range(record.n_robots):
-            observe_robot(record, state, robot, values, at)
+            behind = number_offset(record, state, robot, robot + 1)
+            observe_robot(record, state, robot, ahead, behind, values, at)
+            ahead = behind
             at += 10
-        values[at] = number_offset(record, state, record.n_robots - 1)
+        values[at] = ahead
     else:
-        observe_robot(record, state, agent, values, at)
+        formation = at + 10
         for segment in range(record.n_robots):
-            values[at + 10 + segment] = number_offset(record, state, segment)
+            values[formation + segment] = number_offset(record, state, segment, segment + 1)
+        if agent > 0:
+            ahead = values[formation + agent - 1]
+        observe_robot(record, state, agent, ahead, values[formation + agent], values, at)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from hose_mj.compiled import inlined, jitable
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import begin
+from hose_mj.tasks.line_geometry import NONE
 from hose_mj.tasks.line_kernels import (
     ABSENT,
     RANDOM,
     ROBOTS,
     Line,
+    find_covered_by,
     get_x,
     get_y,
     is_at_goal,
-    is_covered,
     is_inside,
     put,
 )
@@ -26,16 +27,14 @@ def fits(record, state, robot):  # type: ignore[no-untyped-def]
     x, y = get_x(state, robot), get_y(state, robot)
     if not is_inside(record, x, y):
         return False
+    hose_blocks = record.collision != ROBOTS
+    covered = 0
     for other in range(robot + 1, record.n_robots):
+        covered |= find_covered_by(record, state, other, other + hose_blocks, x, y)
+    for other in range(robot + 2, record.n_robots if hose_blocks else 0):
         ox, oy = get_x(state, other), get_y(state, other)
-        if ox == x and oy == y:
-            return False
-        if record.collision != ROBOTS and (
-            is_covered(state, other, x, y)
-            or (other > robot + 1 and is_covered(state, robot, ox, oy))
-        ):
-            return False
-    return True
+        covered |= find_covered_by(record, state, robot, robot + 1, ox, oy)
+    return (covered >> NONE & 1) == 0
 
 
 @jitable

@@ -7,7 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hose_mj.tasks import kernels
-from hose_mj.tasks.line_geometry import covers, make_direction_table, make_distance_table
+from hose_mj.tasks.line_geometry import (
+    covers,
+    make_cover_table,
+    make_direction_table,
+    make_distance_table,
+)
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.twins import line as twin
 from hose_mj.tasks.twins.line import LineTwin
@@ -44,6 +49,17 @@ def test_covering_is_that_of_exact_fractions_and_symmetric(a, b, cell):
     assert covered == covers(*b, *a, *cell)
     mirrored = [(-y, x) for x, y in (a, b, cell)]
     assert covered == covers(*mirrored[0], *mirrored[1], *mirrored[2])
+
+
+def test_a_cover_table_knows_all_cells_around_short_segments():
+    table = make_cover_table(2)
+    places = list(product(range(-4, 5), repeat=2))
+    ways = list(twin.STEPS.values())
+    for row, end in enumerate(product(range(-2, 3), repeat=2)):
+        for column, (x, y) in enumerate(places):
+            covered = [twin.covers((0, 0), end, (x + dx, y + dy)) for dx, dy in ways]
+            assert table[row, column] == sum(1 << a for a, is_so in enumerate(covered) if is_so)
+            assert not (max(abs(x), abs(y)) == 4 and any(covered))
 
 
 def test_cardinalities_are_those_of_table_4_1():

@@ -9,6 +9,8 @@ VARIANTS = [
     ("line", {"n_robots": 5, "collision": "robots", "violations_end": False}),
     ("line", {"n_robots": 4, "move_rule": "cancelling", "violations_end": False}),
     ("line", {"n_robots": 5, "half_width": 3, "hose_length": 7, "goal": "none"}),
+    # segments longer than those in the cover table
+    ("line", {"n_robots": 3, "hose_length": 36, "violations_end": False}),
     ("line-2015", {}),
     ("line-2015", {"start": "random", "goal": "random", "n_robots": 6}),
     ("line-non-cooperative", {"n_robots": 2}),

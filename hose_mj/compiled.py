@@ -75,6 +75,9 @@ compiled = _decorate()
 kernel = _decorate(_nrt=False)
 # For small functions of a record with many fields, which a call would have to copy one by one.
 inlined = _decorate(_nrt=False, forceinline=True)
+# Put into its callers before they are compiled: no code of its own, which each caller of a long
+# function would optimize once more.
+merged = _decorate(inline="always")
 # Compiled into compiled callers; for others it stays plain Python, whatever its arguments are.
 jitable: Any = register_jitable(forceinline=True, error_model="numpy")
 

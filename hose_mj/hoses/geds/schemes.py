@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
+from hose_mj.compiled import compiled, kernel, merged
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.solver import (
@@ -102,7 +102,7 @@ def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-de
     return h, fraction
 
 
-@kernel
+@merged
 def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, counts):  # type: ignore[no-untyped-def]
     """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
 
@@ -148,7 +148,7 @@ def start_step(axes, holds, dt):  # type: ignore[no-untyped-def]
         restore_frames(twist)
 
 
-@kernel
+@merged
 def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
     """One step; where its Newton fails, backward Euler with a line search in ever finer parts."""
     careful = Limits(
@@ -191,7 +191,7 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
     return verdict
 
 
-@kernel
+@merged
 def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-untyped-def]
     """Velocity Verlet with holds on positions and velocities (RATTLE); no damping, no drag."""
     width = 4 * len(axes)

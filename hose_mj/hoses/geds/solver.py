@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
+from hose_mj.compiled import compiled, kernel, merged
 from hose_mj.hoses.geds.band import (
     factorize,
     factorize_indefinite,
@@ -250,7 +250,7 @@ def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
                         work.band[start + j * d + c2, (i - j) * d + c1 - c2] += weight * bend
 
 
-@kernel
+@merged
 def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):  # type: ignore[no-untyped-def]
     """Fills work.gradient with the residual without holds, work.band with its derivative.
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.tables import Table
 
 Vector = tuple[float, float, float]
@@ -57,6 +58,12 @@ class Spin(Timed):
 
     turns: float
 
+    @property
+    def fastest(self) -> float:
+        """Its largest rate (rad/s)."""
+        even = math.tau * abs(self.turns) / self.duration
+        return even if self.profile == "linear" else 0.5 * math.pi * even
+
 
 @dataclass(frozen=True)
 class HeldPlace:
@@ -68,6 +75,8 @@ class HeldPlace:
         tangent: unit tangent of a clamp at first; None for an attachment.
         moves: one after the other.
         spins: one after the other.
+        director: unit vector m1 of the material at a clamp at first, about which
+            `bending_stiffness` bends; None for one of our choice.
     """
 
     arc_length: float
@@ -75,6 +84,7 @@ class HeldPlace:
     tangent: Vector | None
     moves: tuple[Movement, ...] = ()
     spins: tuple[Spin, ...] = ()
+    director: Vector | None = None
 
     @property
     def changes(self) -> tuple[Timed, ...]:
@@ -102,15 +112,15 @@ class HeldPlace:
         return math.tau * sum(spin.turns * spin.progress(time) for spin in self.spins)
 
 
-def read_holds(table: Table, length: float) -> tuple[HeldPlace, ...]:
+def read_holds(table: Table, spec: HoseSpec) -> tuple[HeldPlace, ...]:
     """Returns the holds of a file, by rising arc length.
 
     Raises:
-        InputError: an unknown key, a value out of range, two holds at one place, or a stretch of
-            hose that would have to be longer than it is.
+        InputError: an unknown key, a value out of range, two holds at one place, a stretch of hose
+            that would have to be longer than it is, or a clamp whose director is unknown.
     """
-    tables = table.tables("holds")
-    read = [(part, _read_hold(part, length)) for part in tables]
+    length = spec.length
+    read = [(part, _read_hold(part, spec)) for part in table.tables("holds")]
     read.sort(key=lambda pair: pair[1].arc_length)
     for (_, one), (where, other) in pairwise(read):
         gap = other.arc_length - one.arc_length
@@ -128,8 +138,8 @@ def read_place(table: Table, length: float) -> float:
     return table.number("at", least=0.0, most=length)
 
 
-def _read_hold(table: Table, length: float) -> HeldPlace:
-    place = read_place(table, length)
+def _read_hold(table: Table, spec: HoseSpec) -> HeldPlace:
+    place = read_place(table, spec.length)
     table.require("kind", "clamp, which holds point and direction, or attach, which holds a point")
     clamped = table.word("kind", ("clamp", "attach")) == "clamp"
     table.require("position", "three numbers (m)")
@@ -144,6 +154,7 @@ def _read_hold(table: Table, length: float) -> HeldPlace:
         tangent,
         tuple(_read_move(part, clamped) for part in table.tables("move")),
         tuple(_read_spin(part) for part in table.tables("spin")),
+        _read_director(table, tangent, place, spec),
     )
     if hold.spins and not clamped:
         raise table.fail("spin", "given", "left out for kind = 'attach': only a clamp turns")
@@ -187,14 +198,32 @@ def _read_position(table: Table, key: str) -> Vector | None:
 
 def _read_tangent(table: Table, clamped: bool) -> Vector | None:
     aim: Vector | None = table.vector("tangent")
-    if aim is None:
-        return None
-    if not clamped:
+    if aim is not None and not clamped:
         raise table.fail("tangent", list(aim), "left out for kind = 'attach'")
-    size = math.hypot(*aim)
-    if size < 1e-9:
+    if aim is not None and math.hypot(*aim) < 1e-9:
         raise table.fail("tangent", list(aim), "three numbers that are not all zero")
-    return aim[0] / size, aim[1] / size, aim[2] / size
+    return None if aim is None else _scale(aim)
+
+
+def _read_director(
+    table: Table, tangent: Vector | None, place: float, spec: HoseSpec
+) -> Vector | None:
+    """m1 across the tangent; what is laid is laid from its beginning on, where we can choose."""
+    given: Vector | None = table.vector("director")
+    if given is None:
+        if tangent is not None and place > 0.0 and not spec.is_isotropic:
+            valid = "three numbers: a coil or ribbon needs it at a clamp beyond its start"
+            raise table.fail("director", None, valid)
+        return None
+    if tangent is None:
+        raise table.fail("director", list(given), "left out for kind = 'attach'")
+    if spec.is_isotropic:
+        valid = "left out for a hose that is straight at rest and bends alike to all sides"
+        raise table.fail("director", list(given), valid)
+    across = _subtract(given, tangent, sum(a * b for a, b in zip(given, tangent, strict=True)))
+    if math.hypot(*across) <= 1e-6 * math.hypot(*given):
+        raise table.fail("director", list(given), "three numbers, a direction across the tangent")
+    return _scale(across)
 
 
 def _check_reach(table: Table, one: HeldPlace, other: HeldPlace, gap: float) -> None:
@@ -233,6 +262,11 @@ def turn_towards(one: Vector, other: Vector, share: float) -> Vector:
     c, s = math.cos(angle), math.sin(angle) / size
     x, y, z = (c * a + s * b for a, b in zip(one, across, strict=True))
     return x, y, z
+
+
+def _scale(vector: Vector) -> Vector:
+    size = math.hypot(*vector)
+    return vector[0] / size, vector[1] / size, vector[2] / size
 
 
 def _subtract(vector: Vector, along: Vector, amount: float) -> Vector:

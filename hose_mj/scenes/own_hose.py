@@ -93,7 +93,7 @@ def read_own_hose(path: Path) -> OwnHose:
     if hose is None:
         raise file.fail("hose", None, "a table [hose] with length and material or stiffnesses")
     spec = read_spec(hose)
-    holds = read_holds(file, spec.length)
+    holds = read_holds(file, spec)
     gravity, loads = _read_loads(file.table("loads"), spec.length)
     floor = _read_floor(file.table("floor"))
     shape = file.points("shape")
@@ -118,6 +118,7 @@ def read_own_hose(path: Path) -> OwnHose:
     )
     _check_held(own, file)
     _check_shape(own, file)
+    _check_floor(own, file)
     return own
 
 
@@ -186,6 +187,20 @@ def _check_shape(own: OwnHose, file: Table) -> None:
         if math.dist(here, hold.position) > _SHAPE_SLACK * own.spec.length:
             valid = f"a line that passes the hold at {hold.arc_length:g} m at its position"
             raise file.fail("shape", [round(x, 6) for x in here], valid)
+
+
+def _check_floor(own: OwnHose, file: Table) -> None:
+    """Holds and the line of the user stay above the floor, by the hose's radius at least."""
+    if own.floor is None:
+        return
+    least = own.floor.height + own.spec.radius
+    held = [hold.position for hold in own.holds]
+    held += [move.to for hold in own.holds for move in hold.moves if move.to is not None]
+    for key, places in (("holds", held), ("shape", own.shape or ())):
+        for place in places:
+            if place[2] < least - 1e-9:
+                valid = f"at or above z = {least:g} m, a radius above the floor"
+                raise file.fail(key, list(place), valid)
 
 
 def find_on_line(points: tuple[Vector, ...], share: float) -> Vector:

@@ -5,22 +5,25 @@ from __future__ import annotations
 import inspect
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from hose_mj.errors import InputError, StepError
+from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.registry import MODELS, make_hose
 from hose_mj.scenes.own_hold import HeldPlace
 from hose_mj.scenes.own_hose import OwnHose
 from hose_mj.validation.case import Case, Motion
-from hose_mj.validation.own_shape import Line, make_line
+from hose_mj.validation.own_shape import Line, choose_director, count_turns, make_line
 
 CASE_ID = "own-hose"
 N_PROBES = 17
 """Places along the hose at which models are compared."""
 REST_POINTS = 48
-"""Control points of the rest shape from which all models start."""
+"""Control points of the rest shape from which all models start, times `find_fineness`."""
 FEWEST_SEGMENTS = 10
 """The coarsest chain that is run."""
 _FIRST_MODE = 3.5
@@ -28,6 +31,7 @@ _FIRST_MODE = 3.5
 _PUSH = 1e-3
 """By this fraction of the length the hose is bent aside before it comes to rest."""
 _STEPS_TO_REST = 400
+_SOME_SPIN = 1e-3
 _FLAT = 1e-6
 _PAUSE = 0.04
 _FEWEST, _MOST = 25, 500
@@ -40,9 +44,11 @@ def make_case(own: OwnHose) -> Case:
     Models start from one line, the rest shape where the hose begins in equilibrium.
 
     Raises:
+        InputError: the hose would be laid through the floor.
         StepError: GEDS found no rest shape.
     """
-    at_rest = own.duration is None or own.start == "equilibrium"
+    _check_above_floor(own)
+    at_rest = starts_at_rest(own)
     line = find_rest(own) if at_rest else make_line(own)
     places = line(np.linspace(0.0, own.spec.length, N_PROBES))
     planar = is_planar(own) and bool(np.ptp(places[:, 1]) < _FLAT * own.spec.length)
@@ -74,26 +80,59 @@ def make_case(own: OwnHose) -> Case:
             for hold in own.holds
         ),
         planar=planar,
+        obstacles=make_obstacles(own),
     )
+
+
+def starts_at_rest(own: OwnHose) -> bool:
+    """Whether a rest shape is to be found, for its own sake or to start from."""
+    return own.duration is None or own.start == "equilibrium"
+
+
+def find_fineness(own: OwnHose) -> int:
+    """By how much finer than others a hose is to be resolved: two turns of a coil count as one."""
+    return max(1, math.ceil(count_turns(own) / 2.0))
+
+
+def make_obstacles(own: OwnHose) -> tuple[Obstacle, ...]:
+    """The floor, where there is one."""
+    if own.floor is None:
+        return ()
+    height, friction = own.floor.height, own.floor.friction
+    return (Obstacle(kind="plane", position=(0.0, 0.0, height), friction=friction),)
+
+
+def _check_above_floor(own: OwnHose) -> None:
+    if own.floor is None:
+        return
+    lowest = float(np.min(make_line(own)(np.linspace(0.0, own.spec.length, 401))[:, 2]))
+    least = own.floor.height + own.spec.radius
+    if lowest < least - 0.01 * own.spec.radius:
+        valid = f"points along which the hose can be laid at or above z = {least:g} m"
+        raise InputError("shape", f"down to z = {lowest:g} m", valid)
 
 
 def put(own: OwnHose, hose: HoseModel, line: Line) -> list[Hold]:
     """Lays a hose along a line, holds and loads it; returns the holds in the file's order."""
-    hose.reset(line)
-    if own.floor is not None:
-        hose.add_floor(height=own.floor.height, friction=own.floor.friction)  # type: ignore[attr-defined]
-    holds = [
-        hose.attach(hold.arc_length, hold.position)
-        if hold.tangent is None
-        else hose.clamp(hold.arc_length, hold.position, hold.tangent)
-        for hold in own.holds
-    ]
+    if isinstance(hose, GedsHose) and not own.spec.is_isotropic:
+        hose.reset(line, director=choose_director(own, line))
+    else:
+        hose.reset(line)
+    holds = [_hold(hose, place) for place in own.holds]
     for load in own.loads:
         if any(load.force):
             hose.apply_force(load.arc_length, load.force)
         if any(load.moment):
             hose.apply_moment(load.arc_length, load.moment)
     return holds
+
+
+def _hold(hose: HoseModel, place: HeldPlace) -> Hold:
+    if place.tangent is None:
+        return hose.attach(place.arc_length, place.position)
+    if isinstance(hose, GedsHose) and place.director is not None:
+        return hose.clamp(place.arc_length, place.position, place.tangent, place.director)
+    return hose.clamp(place.arc_length, place.position, place.tangent)
 
 
 def find_rest(own: OwnHose) -> Line:
@@ -116,7 +155,12 @@ def find_rest(own: OwnHose) -> Line:
         aside = np.sin(2.3 * np.pi * s / length) * _PUSH * length
         return np.asarray(start(s) + aside[:, None] * np.array([0.1, 1.0, 0.1]))
 
-    options = {"gravity": own.gravity, "control_points": REST_POINTS}
+    points = REST_POINTS * find_fineness(own)
+    options = {
+        "gravity": own.gravity,
+        "control_points": points,
+        "obstacles": make_obstacles(own),
+    }
     loose = make_hose("geds", thick, timestep=0.1 / pace, scheme="backward-euler", **options)
     hose = make_hose("geds", spec, **options)
     try:
@@ -145,16 +189,30 @@ def is_planar(own: OwnHose) -> bool:
 
 def find_obstacle(own: OwnHose, model: str) -> InputError | None:
     """Why a model cannot run this hose, or None."""
-    kind = MODELS[model].load()
-    if own.floor is not None and not hasattr(kind, "add_floor"):
-        return InputError("floor", own.floor.height, f"left out: {model} has no floor yet")
-    if own.spins and "spin" not in inspect.signature(kind.move).parameters:
-        return InputError("spin", "given", f"left out: {model} cannot turn a clamp yet")
-    options = {"segments": FEWEST_SEGMENTS} if model != "geds" else {}
+    options: dict[str, Any] = {} if model == "geds" else {"segments": FEWEST_SEGMENTS}
+    if own.floor is not None:
+        why = _find_floor_obstacle(own, model)
+        if why is not None:
+            return InputError("floor", own.floor.height, f"left out: {why}")
+        options["obstacles"] = make_obstacles(own)
     try:
-        make_hose(model, own.spec, gravity=own.gravity, timestep=1e-3, **options)
+        hose = make_hose(model, own.spec, gravity=own.gravity, timestep=1e-3, **options)
     except InputError as error:
         return InputError(f"hose.{error.thing}", error.value, f"for {model} {error.valid}")
+    if own.spins:
+        try:
+            hose.move(hose.clamp(0.0), spin=_SOME_SPIN)
+        except InputError as error:
+            return InputError("spin", "given", f"left out: {model} takes {error.valid}")
+    return None
+
+
+def _find_floor_obstacle(own: OwnHose, model: str) -> str | None:
+    """Why a model cannot lie on a floor here, or None."""
+    if "obstacles" not in inspect.signature(MODELS[model].load()).parameters:
+        return f"{model} touches nothing"
+    if model != "geds" and starts_at_rest(own):
+        return f"only geds finds a rest shape on it; {model} runs with study.start = 'as-laid'"
     return None
 
 
@@ -193,7 +251,7 @@ def _make_motion(own: OwnHose, duration: float) -> Motion:
     def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
         for k in changing:
             hold = own.holds[k]
-            spin = {"spin": hold.angle_at(time)} if hold.spins else {}
-            hose.move(holds[k], hold.position_at(time), hold.tangent_at(time), **spin)
+            spin = hold.angle_at(time) - hold.angle_at(time - hose.timestep)
+            hose.move(holds[k], hold.position_at(time), hold.tangent_at(time), spin)
 
     return Motion(duration, n_samples, drive)

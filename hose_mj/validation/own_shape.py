@@ -16,16 +16,18 @@ from hose_mj.scenes.own_hose import OwnHose
 Line = Callable[[Array], Array]
 _N = 200
 """Points of a piece between two holds."""
+_CHORD = 1e-4
+"""Chords of this fraction of the length tell how a line bends where it begins."""
 _AXES = np.eye(3)
 
 
 def make_line(own: OwnHose) -> Line:
     """Returns positions (k, 3) over arc lengths (k,): along `own.shape`, or through the holds.
 
-    Between two holds it is a cubic curve with the tangents of clamps, bent out along gravity until
-    it is as long as the hose there; beyond the first and the last hold it is straight, and hangs
-    down from a single attachment. A hose that is a coil at rest and has one hold at most is laid
-    as that coil.
+    Between two holds it is a cubic curve with the tangents of clamps, bent out along gravity, or
+    aside above a floor, until it is as long as the hose there; beyond the first and the last hold
+    it is straight, and hangs down from a single attachment. A hose that is a coil at rest and has
+    one hold at most is laid as that coil.
     """
     if own.shape is not None:
         points = np.array(own.shape)
@@ -37,11 +39,12 @@ def make_line(own: OwnHose) -> Line:
         return lambda s: np.outer(s, _AXES[0])
     places = [hold.arc_length for hold in own.holds]
     nodes, tangents = [np.array(hold.position) for hold in own.holds], _choose_tangents(own)
+    out = own.gravity if own.floor is None else (0.0, 0.0, 0.0)
     pieces = []
     if places[0] > 0.0:
         pieces.append(_lay_tail(0.0, places[0], nodes[0] - places[0] * tangents[0], tangents[0]))
     for (k, begin), (_, end) in pairwise(enumerate(places)):
-        points = bend_between(nodes[k : k + 2], tangents[k : k + 2], end - begin, own.gravity)
+        points = bend_between(nodes[k : k + 2], tangents[k : k + 2], end - begin, out)
         along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
         pieces.append((begin + along * (end - begin) / along[-1], points))
     if places[-1] < own.spec.length:
@@ -51,14 +54,47 @@ def make_line(own: OwnHose) -> Line:
     return _interpolate(s, points)
 
 
+def count_turns(own: OwnHose) -> float:
+    """Turns of the coil that a hose is at rest; 0 for one that is straight then."""
+    spec = own.spec
+    if spec.rest_curvature == 0.0:
+        return 0.0
+    return math.hypot(spec.rest_curvature, spec.rest_torsion) * spec.length / math.tau
+
+
+def choose_director(own: OwnHose, line: Line) -> Array:
+    """Returns m1 (3,) with which a coil or ribbon is laid where it begins.
+
+    A clamp there has it, by the file or from the line of `make_line`. Elsewhere no moment bends
+    the end: a coil is curved there as at rest, about m1. A ribbon begins with its flat side up.
+    """
+    first = own.holds[0] if own.holds and own.holds[0].arc_length == 0.0 else None
+    if first is not None and first.director is not None:
+        return np.array(first.director)
+    if first is not None and first.tangent is not None:
+        line = make_line(own)
+    step = _CHORD * own.spec.length
+    one, other = np.diff(line(step * np.arange(3.0)), axis=0) / step
+    bend = np.cross(one, other) / step
+    if np.linalg.norm(bend) > 0.1 * abs(own.spec.rest_curvature) > 0.0:
+        return np.asarray(bend / np.linalg.norm(bend) * np.sign(own.spec.rest_curvature))
+    tangent = one / np.linalg.norm(one)
+    return np.cross(_choose_side(tangent, [tangent], np.array(own.gravity)), tangent)
+
+
 def _make_coil(own: OwnHose) -> Line:
-    """The helix of constant curvature K and torsion T: Darboux's vector T t + K b is its axis."""
+    """The helix of constant curvature K and torsion T: Darboux's vector T t + K b is its axis.
+
+    It is bent about the director of a clamp, b.
+    """
     turn, twist = own.spec.rest_curvature, own.spec.rest_torsion
     origin, start, tangent = np.zeros(3), 0.0, _AXES[0]
     if own.holds:
         start, origin = own.holds[0].arc_length, np.array(own.holds[0].position)
         tangent = _choose_tangents(own)[0]
     side = _choose_side(tangent, [tangent], np.zeros(3))
+    if own.holds and own.holds[0].director is not None:
+        side = np.cross(own.holds[0].director, tangent)
     rate = math.hypot(turn, twist)
     axis = (twist * tangent + turn * np.cross(tangent, side)) / rate
 

@@ -19,7 +19,7 @@ from hose_mj.validation.own_answers import (
     list_answers,
     list_disagreements,
 )
-from hose_mj.validation.own_hose import CASE_ID, find_obstacle, make_case
+from hose_mj.validation.own_hose import CASE_ID, find_fineness, find_obstacle, make_case
 from hose_mj.validation.run import (
     BUDGET_SPENT,
     REFERENCE_POINTS,
@@ -60,10 +60,14 @@ GRID = Grid(
     rounds=2,
     reference_steps=(0, 0),
 )
-"""Of a user's hose; the longest run and the reference's steps depend on budget and motion."""
+"""Of a user's hose; the longest run and the reference's steps depend on budget and motion.
+
+GEDS's control points are these times `find_fineness`.
+"""
 REFERENCE_STEP = 2e-3
 """The first reference takes steps of about this length (s)."""
 MOST_REFERENCE_POINTS = 192
+"""Times `find_fineness`."""
 _TIGHTER = 5.0
 """A reference is to be this many times closer to its limit than the smallest wanted error."""
 _SHARE_OF_REFERENCE, _SHARE_OF_RUN = 0.3, 0.08
@@ -122,6 +126,16 @@ def list_own_models() -> tuple[str, ...]:
     return tuple(model for model in OWN_MODELS if model in MODELS)
 
 
+def make_grid(own: OwnHose) -> Grid:
+    """The settings for a hose: GEDS's control points grow with the turns of a coil."""
+
+    def refine(resolutions: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+        geds = tuple(find_fineness(own) * points for points in resolutions["geds"])
+        return {**resolutions, "geds": geds}
+
+    return replace(GRID, static=refine(GRID.static), dynamic=refine(GRID.dynamic))
+
+
 def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], None]) -> OwnStudy:
     """Compares the models on a user's hose within about its budget.
 
@@ -140,7 +154,7 @@ def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], 
             study.refused[model] = str(obstacle)
     running = tuple(model for model in models if model not in study.refused)
     advance("compiling")
-    _compile(case)
+    _compile(case, make_grid(own))
     deadline = time.perf_counter() + own.budget
     _find_references(study, running, advance)
     if case.motion is None:
@@ -152,10 +166,10 @@ def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], 
     return study
 
 
-def _compile(case: Case) -> None:
+def _compile(case: Case, grid: Grid) -> None:
     """Lays and moves small hoses once, so that compilation is no part of budget and timings."""
     for scheme in ("bdf2", "bdf2, planar")[: 1 + case.planar]:
-        hose = Setting("geds", scheme, GRID.dynamic["geds"][0], None, SMALLEST_STEP).make(case)
+        hose = Setting("geds", scheme, grid.dynamic["geds"][-1], None, SMALLEST_STEP).make(case)
         holds = case.lay(hose)
         if case.motion is None:
             case.probe(hose)
@@ -172,7 +186,8 @@ def _find_references(
     own, case = study.own, study.result.case
     goal = min(own.errors) / _TIGHTER
     until = time.perf_counter() + own.budget * _SHARE_OF_REFERENCE
-    points, level = REFERENCE_POINTS * (2 if case.motion is None else 1), 0
+    fineness = find_fineness(own)
+    points, level = fineness * REFERENCE_POINTS * (2 if case.motion is None else 1), 0
     n_references = 2 if set(models) - {"geds"} else 1
     while True:
         advance(f"reference, {points} control points")
@@ -181,7 +196,7 @@ def _find_references(
         now = time.perf_counter()
         study.result.stretchable = reference
         # The next one has twice the points and half the steps.
-        if reference.uncertainty <= goal or 2 * points > MOST_REFERENCE_POINTS:
+        if reference.uncertainty <= goal or 2 * points > fineness * MOST_REFERENCE_POINTS:
             break
         if now + 4.0 * n_references * (now - begun) > until:
             break
@@ -214,9 +229,9 @@ def _run_statics(
     study: OwnStudy, models: tuple[str, ...], deadline: float, advance: Callable[[str], None]
 ) -> None:
     """Coarse resolutions first; one that would take longer than is left goes by its coarser one."""
-    case, result = study.result.case, study.result
+    case, result, grid = study.result.case, study.result, make_grid(study.own)
     took: dict[tuple[str, bool | None], float] = {}
-    for setting in sorted(list_static(case, models, GRID), key=lambda s: _rank(s, GRID.static)):
+    for setting in sorted(list_static(case, models, grid), key=lambda s: _rank(s, grid.static)):
         kind = (setting.model, setting.clamp_corrected)
         begun = time.perf_counter()
         if begun + _GROWTH * took.get(kind, 0.0) > deadline:
@@ -236,10 +251,17 @@ def _run_motion(
     """Coarse resolutions of all models first, so that a spent budget leaves out the finest."""
     own, result = study.own, study.result
     assert result.stretchable is not None
-    grid = replace(GRID, longest_run=own.budget * _SHARE_OF_RUN)
+    grid = replace(make_grid(own), longest_run=own.budget * _SHARE_OF_RUN)
     ladders = list(list_ladders(result.case, models, grid, list_own_steps))
     ladders.sort(key=lambda ladder: _rank(ladder[0], grid.dynamic))
-    for ladder in ladders:
+    fastest = max((spin.fastest for hold in own.holds for spin in hold.spins), default=0.0)
+    for whole in ladders:
+        ladder = [setting for setting in whole if _can_spin(setting, fastest)]
+        if not ladder:
+            result.skipped.append(
+                Skipped(CASE_ID, whole[-1], "a clamp turns by half and more in a step")
+            )
+            continue
         setting = ladder[0]
         advance(f"{setting.model}, {setting.resolution}")
         if _count_enough(result.outcomes, setting, min(own.errors)) >= _ENOUGH:
@@ -256,6 +278,12 @@ def _run_motion(
         result.skipped += skipped
     advance("timing")
     time_rounds(result.case, result.outcomes, grid, own.errors, deadline + _EXTRA * own.budget)
+
+
+def _can_spin(setting: Setting, rate: float) -> bool:
+    """Whether a clamp that turns so fast (rad/s) may do so in this setting: see `HoseModel.move`."""
+    assert setting.timestep is not None
+    return setting.model == "geds" or rate * setting.timestep < math.pi
 
 
 def list_own_steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:

@@ -6,6 +6,8 @@ short coupling between two Gauss points is not lost, and the mass is right to th
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hose_mj.hoses.model import Array
@@ -19,12 +21,23 @@ def make_cells(weights: Array, n_spans: int, length: float) -> Array:
     return np.asarray((np.arange(n_spans)[:, None, None] + inside) * length / n_spans)
 
 
-def average(spec: HoseSpec, name: str, cells: Array, *, inverse: bool = False) -> Array:
-    """Returns the mean of a property of the hose, or of its inverse, over cells (..., 2)."""
+def average_stiffness(spec: HoseSpec, name: str, cells: Array) -> Array:
+    """Returns the stiffness of cells (..., 2) whose pieces are springs in series.
 
-    def convert(value: float) -> float:
-        return 1.0 / value if inverse else value
+    It is the inverse of the mean softness; 0 everywhere if the hose itself has none.
+    """
+    if getattr(spec, name) == 0.0:
+        return np.zeros(cells.shape[:-1])
+    return 1.0 / _average(spec, name, cells, lambda value: 1.0 / value)
 
+
+def average_density(spec: HoseSpec, cells: Array) -> Array:
+    """Returns the mean mass per length of cells (..., 2), kg/m."""
+    return _average(spec, "linear_density", cells, lambda value: value)
+
+
+def _average(spec: HoseSpec, name: str, cells: Array, convert: Callable[[float], float]) -> Array:
+    """Mean of what is made of a property over cells (..., 2)."""
     own = convert(float(getattr(spec, name)))
     mean = np.full(cells.shape[:-1], own)
     for fitting in spec.fittings:

@@ -8,7 +8,7 @@ from hose_mj.compiled import compile_notice, run_kernel
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, schemes, solver
 from hose_mj.hoses.geds.contact import add_contact
-from hose_mj.hoses.geds.fittings import average, make_cells
+from hose_mj.hoses.geds.fittings import average_density, average_stiffness, make_cells
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist
@@ -51,21 +51,20 @@ def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
     n_spans = len(tables.first)
     spans = make_cells(np.ones(1), n_spans, spec.length)[:, 0]
     cells = make_cells(tables.weights, n_spans, spec.length)
-    bending = average(spec, "bending_stiffness", cells)
+    bending = average_stiffness(spec, "bending_stiffness", cells)
     second = spec.second_bending_stiffness or spec.bending_stiffness
     elasticity = Elasticity(
-        # Springs in series: the mean of the softness counts.
-        1.0 / average(spec, "axial_stiffness", spans, inverse=True),
+        average_stiffness(spec, "axial_stiffness", spans),
         bending,
         bending * (second / spec.bending_stiffness),
-        average(spec, "torsional_stiffness", cells),
+        average_stiffness(spec, "torsional_stiffness", cells),
         np.full(n_spans, spec.rest_strain, dtype=np.float64),
         np.full((n_spans, 3), spec.rest_curvature, dtype=np.float64),
         np.full((n_spans, 3), spec.rest_torsion, dtype=np.float64),
         float(spec.damping_time),
     )
     quarters = make_cells(basis.MASS_WEIGHTS, n_spans, spec.length)
-    mass = basis.make_mass(knots, average(spec, "linear_density", quarters))
+    mass = basis.make_mass(knots, average_density(spec, quarters))
     # Of a solid round section about its axis.
     gyration = 0.5 * spec.radius**2
     return solver.Hose(tables, elasticity, mass, gyration, float(spec.drag / spec.linear_density))

@@ -26,6 +26,7 @@ class SplineBody:
         spec: the hose.
         spline: its knots and its plane.
         gravity: (3,) m/s^2.
+        frenet: whether theta is measured from the Frenet normal (frenet.py).
 
     Attributes:
         spec, gravity: as given.
@@ -34,13 +35,15 @@ class SplineBody:
         InputError: gravity out of the plane.
     """
 
-    def __init__(self, spec: HoseSpec, spline: Spline, gravity: ArrayLike) -> None:
+    def __init__(
+        self, spec: HoseSpec, spline: Spline, gravity: ArrayLike, frenet: bool = False
+    ) -> None:
         self.spec = spec
         self.gravity = check_vector("gravity", gravity).copy()
         spline.check_in_plane("gravity", self.gravity, 0.0)
         self._spline = spline
         self._axes = spline.axes
-        self._hose = mechanics.make_constants(spec, spline.knots)
+        self._hose = mechanics.make_constants(spec, spline.knots, frenet)
         uniform = spline.from_world(np.tile(self.gravity, (spline.n_control_points, 1)))
         self._weight = self._multiply_mass(uniform)
         self._state = schemes.make_state(spline.size)
@@ -96,7 +99,7 @@ class SplineBody:
         twisting strain, without its Frenet frame).
         """
         s = check_arc_lengths(arc_length, self.spec.length)
-        if self._spline.has_theta:
+        if self._spline.has_theta and not self._hose.elasticity.frenet:
             run_kernel(
                 *(frames.move_frames, self._axes, self._hose.tables, self._holds.rows.twist),
                 *(self._state.x, self._span),

@@ -3,7 +3,8 @@
 With a = r', b = r'' (derivatives by rest arc length):
 
 * bending: bending.py for a hose that bends alike in every direction, at three Gauss points a span;
-* twist: twist.py for that hose, rod.py (with theta as fourth unknown) for all others;
+* twist: twist.py for that hose, rod.py (with theta as fourth unknown) for all others; frenet.py for
+  the literal strain of GEDS, with theta as well;
 * stretching: EA h/2 (mean of |a| - 1 over the span)^2. The mean instead of the pointwise strain
   removes membrane locking. In the first and the last span the linear mode of the strain is added;
   without it two axial modes would cost no energy.
@@ -17,6 +18,7 @@ import numpy as np
 from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
 from hose_mj.hoses.geds.frames import move_clamp_frames
+from hose_mj.hoses.geds.frenet import add_frenet, compute_frenet_energy
 from hose_mj.hoses.geds.rod import compute_rod_strains, set_rod
 from hose_mj.hoses.geds.span import (
     compute_derivatives,
@@ -64,7 +66,7 @@ def compute_energy(axes, tables, elasticity, frames, x, p, strains):  # type: ig
             A, B, C = compute_derivatives(axes, tables, e, g, x, p.a, p.b)
             half = 0.5 * tables.weights[g] * tables.span_length
             rest = elasticity.rest_curvature[e, g]
-            if len(axes) == 4:
+            if len(axes) == 4 and not elasticity.frenet:
                 first, second, twist = compute_rod_strains(frames, 3 * e + g, g, p)
                 bending += half * elasticity.bending_stiffness[e, g] * (first - rest) ** 2
                 bending += half * elasticity.second_stiffness[e, g] * second**2
@@ -78,6 +80,8 @@ def compute_energy(axes, tables, elasticity, frames, x, p, strains):  # type: ig
                 )
                 square = (curvature - rest) ** 2
             bending += half * elasticity.bending_stiffness[e, g] * square
+        if len(axes) == 4 and elasticity.frenet:
+            twisting += compute_frenet_energy(tables, elasticity, e, p)
     return stretching, bending, twisting
 
 
@@ -95,8 +99,11 @@ def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped
 
 
 @inlined
-def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # type: ignore[no-untyped-def]
-    """Adds the span's force to the gradient and its stiffness to the band."""
+def _scatter(axes, tables, e, axial, has_linear_mode, has_turn, p, gradient, band):  # type: ignore[no-untyped-def]
+    """Adds the span's force to the gradient and its stiffness to the band.
+
+    `has_turn`: whether the Gauss points know forces on theta.
+    """
     d = len(axes)
     start = e * d
     for c in range(len(axes[:3])):
@@ -121,7 +128,7 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
             if has_linear_mode:
                 _add_outer(1, c1, c2, axial, p)
             _add_block(d, start, c1, c2, block, band)
-    if d == 4:
+    if d == 4 and has_turn:
         _scatter_force(tables.first, tables.value, e, 4, 3, p, gradient)
         _scatter_turn(tables, e, p, band)
 
@@ -212,6 +219,7 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
     tau = elasticity.damping_time
     scale = 1.0 if exact else 0.0
     viscous = (1.0 - scale) + tau / step
+    has_frames = len(axes) == 4 and not elasticity.frenet
     if len(axes) == 3:
         open_stretches(axes, twist, x)
     for e in range(n_spans):
@@ -229,13 +237,13 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
         stiffness = elasticity.axial_stiffness[e]
         for g in range(3):
             weight = tables.weights[g] * tables.span_length
-            if len(axes) == 4:
+            if has_frames:
                 set_rod(elasticity, twist.frames, e, g, weight, scale, step, p)
             else:
                 bending = weight * elasticity.bending_stiffness[e, g]
-                set_bending(axes, g, bending, scale, viscous, p)
+                set_bending(axes[:3], g, bending, scale, viscous, p)
                 if tau != 0.0:
-                    add_bending_viscosity(axes, g, bending * tau, p)
+                    add_bending_viscosity(axes[:3], g, bending * tau, p)
                 if len(axes) == 2 and elasticity.rest_curvature[e, g] != 0.0:
                     add_rest_curvature(g, -bending * elasticity.rest_curvature[e, g], scale, p)
             tension = stiffness * (mean + tau * mean_rate)
@@ -246,8 +254,10 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
         if len(axes) == 3:
             add_twist(axes, tables, twist, e, scale, x, p)
         axial = stiffness * tables.span_length * (1.0 + tau / step)
-        _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band)
-    if len(axes) == 4:
+        _scatter(axes, tables, e, axial, has_linear_mode, has_frames, p, gradient, band)
+        if len(axes) == 4 and elasticity.frenet:
+            add_frenet(tables, elasticity, e, rate, step, scale, p, gradient, band)
+    if has_frames:
         move_clamp_frames(axes, twist, x)
     if len(axes) == 3:
         close_stretches(twist, np.isinf(step), progress, tau, rate, gradient)

@@ -148,11 +148,14 @@ class HoldSet:
         """Returns the part of a director (3,) across a unit tangent, as a unit vector.
 
         Raises:
-            InputError: three numbers that are not, one along the tangent, any for a planar hose.
+            InputError: three numbers that are not, one along the tangent, any for a planar hose
+                or one whose theta has no frames.
         """
         vector = check_vector("director", director)
         if self._spline.dimension == 2:
             raise InputError("director", vector.tolist(), "None for a hose in a plane")
+        if self._hose.elasticity.frenet:
+            raise InputError("director", vector.tolist(), "None with twist='frenet'")
         across = vector - (vector @ tangent) * tangent
         length = float(np.linalg.norm(across))
         if length < 1e-9 * float(np.linalg.norm(vector)) or length == 0.0:

@@ -9,6 +9,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, schemes, solver
 from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.fittings import average_density, average_stiffness, make_cells
+from hose_mj.hoses.geds.frenet import SMALLEST_BEND
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist
@@ -20,18 +21,18 @@ _ENDLESS = float(np.finfo(np.float64).max)
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
     """Returns True for a hose with theta; raises `InputError` for a form that cannot do it."""
-    if form not in (None, "scalar", "theta"):
-        raise InputError("twist", form, "None, scalar, theta")
+    if form not in (None, "scalar", "theta", "frenet"):
+        raise InputError("twist", form, "None, scalar, theta, frenet")
     if plane is not None:
         if form is not None:
             raise InputError("twist", form, "None for a hose in a plane")
         return False
-    if form == "scalar" and not spec.is_isotropic:
+    if form in ("scalar", "frenet") and not spec.is_isotropic:
         valid = "theta for a hose that is curved at rest or bends unequally"
         raise InputError("twist", form, valid)
-    if form == "theta" and spec.torsional_stiffness == 0.0:
-        raise InputError("torsional_stiffness", 0.0, "a number above 0 with theta")
-    return form == "theta" or not spec.is_isotropic
+    if form in ("theta", "frenet") and spec.torsional_stiffness == 0.0:
+        raise InputError("torsional_stiffness", 0.0, f"a number above 0 with {form}")
+    return form in ("theta", "frenet") or not spec.is_isotropic
 
 
 def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool) -> None:
@@ -44,8 +45,11 @@ def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool) -> None:
         raise InputError("scheme", scheme, "an implicit scheme for a hose with damping or drag")
 
 
-def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
-    """Returns what the kernels need to know of a hose with these knots (n + 4,)."""
+def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> solver.Hose:
+    """Returns what the kernels need to know of a hose with these knots (n + 4,).
+
+    `frenet`: whether its theta is measured from the Frenet normal (frenet.py).
+    """
     with compile_notice("GEDS kernels"):
         tables = basis.make_tables(knots)
     n_spans = len(tables.first)
@@ -62,6 +66,7 @@ def make_constants(spec: HoseSpec, knots: Array) -> solver.Hose:
         np.full((n_spans, 3), spec.rest_curvature, dtype=np.float64),
         np.full((n_spans, 3), spec.rest_torsion, dtype=np.float64),
         float(spec.damping_time),
+        frenet,
     )
     quarters = make_cells(basis.MASS_WEIGHTS, n_spans, spec.length)
     mass = basis.make_mass(knots, average_density(spec, quarters))
@@ -168,8 +173,24 @@ def find_torsional_stiffness(hose: solver.Hose, s: Array) -> Array:
     return np.asarray(stiffness.ravel()[at])
 
 
+def compute_torsion(spline: Spline, hose: solver.Hose, s: Array, x: Array) -> Array:
+    """Returns the Frenet torsion (k,), rad/m, at arc lengths s (k,); see frenet.py."""
+    length = hose.tables.span_length
+    first, second = (spline.evaluate(s, x, derivative) for derivative in (1, 2))
+    # r'' is linear in a span: two places in it give the next derivative.
+    low = np.minimum(s // length, len(hose.tables.first) - 1) * length
+    near, far = (spline.evaluate(low + part * length, x, 2) for part in (0.25, 0.75))
+    across = np.cross(first, second)
+    squares = np.sum(across**2, axis=1)
+    volume = np.sum(across * (far - near), axis=1) / (0.5 * length)
+    return np.asarray(volume / np.maximum(squares, (SMALLEST_BEND / length) ** 2))
+
+
 def compute_twist(spline: Spline, hose: solver.Hose, stretches: Twist, s: Array, x: Array) -> Array:
     """Returns the twist beyond its rest (k,), rad/m, at arc lengths s (k,)."""
+    if hose.elasticity.frenet:
+        rest = hose.elasticity.rest_torsion[0, 0]
+        return spline.evaluate_theta(s, x, 1) + compute_torsion(spline, hose, s, x) - rest
     if spline.has_theta:
         length = spline.length / len(hose.tables.first)
         nodes = np.cumsum(np.tile(hose.tables.gaps, len(hose.tables.first))) * length

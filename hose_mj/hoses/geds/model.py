@@ -44,7 +44,9 @@ class GedsHose(Touching, SplineBody):
             of the cost.
         twist: "scalar" for one angle between two clamps, "theta" for an angle at every control
             point; None for what the spec needs: theta in space where the hose is curved at rest or
-            bends unequally.
+            bends unequally. "frenet" is the literal strain of GEDS, to reproduce how it fails
+            (docs/frenet.md): theta is then the angle from the Frenet normal, a clamp holds that
+            angle, and a hose is laid with theta = 0, that is twisted by the torsion of its curve.
         scheme: "bdf2" (default), "backward-euler", "sdirk2", "midpoint" or "verlet".
         tolerance: Newton goes on while it moves a control point by more than this fraction of L;
             with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
@@ -82,7 +84,7 @@ class GedsHose(Touching, SplineBody):
         has_theta = mechanics.check_twist(twist, spec, plane)
         mechanics.check_scheme(scheme, spec, has_theta)
         spline = Spline(control_points, spec.length, plane, has_theta)
-        super().__init__(spec, spline, gravity)
+        super().__init__(spec, spline, gravity, twist == "frenet")
         self.scheme = scheme
         self.fallbacks = self.iterations = self._steps = 0
         self._timestep = float(timestep)

@@ -30,6 +30,7 @@ class Elasticity(NamedTuple):
         rest_curvature: (1/m), at the Gauss points, (S, 3).
         rest_torsion: (1/m), (S, 3).
         damping_time: Kelvin-Voigt tau (s).
+        frenet: whether a hose with theta measures twist by the Frenet torsion (frenet.py).
     """
 
     axial_stiffness: Array
@@ -40,6 +41,7 @@ class Elasticity(NamedTuple):
     rest_curvature: Array
     rest_torsion: Array
     damping_time: float
+    frenet: bool = False
 
 
 class Span(NamedTuple):
@@ -52,7 +54,8 @@ class Span(NamedTuple):
         stiffness: its second derivatives for coordinates (c1, c2), (4, 4, 12), in the order of
             `Tables.products`: by (a, a), (a, b), (b, a), (b, b) at each Gauss point.
         directors: m1 and m2 at the Gauss point at hand, (2, 3).
-        strains: derivatives of K1, K2 and the twist by a and by b, (3, 2, 4).
+        strains: derivatives of K1, K2 and the twist by a and by b, (3, 2, 4); for frenet.py those
+            of the torsion and of its denominator by a, b and c.
         modes: derivatives of the mean and the linear strain by the control points, (2, 3, 4).
         stretches: |a| and its first two derivatives by A, (3, 3), Gauss point first.
         block: one pair of coordinates of the span's stiffness, (16,).

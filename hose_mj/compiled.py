@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -20,13 +20,14 @@ from typing import Any
 
 import numba
 from numba.core.caching import IndexDataCacheFile
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 _OPTIONS: dict[str, Any] = {
     "cache": True,
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "error_model": "numpy",
 }
+_INLINED: Any = {"error_model": "numpy", "forceinline": True}
 _ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -82,10 +83,38 @@ merged = _decorate(inline="always")
 jitable: Any = register_jitable(forceinline=True, error_model="numpy")
 
 
+def choose_by_unknowns(choices: Mapping[int, Any]) -> Any:
+    """Returns a function of (axes, ...) that is `choices[len(axes)]`, or does nothing without one.
+
+    Chosen before compilation, for compiled callers only: after an `if` numba would also compile
+    what can never run.
+
+    Args:
+        choices: compiled functions that return nothing, by the number of unknowns of a control
+            point; all take the same arguments, axes first.
+    """
+
+    def chosen(axes: tuple[float, ...], *arguments: Any) -> None:
+        raise NotImplementedError
+
+    @overload(chosen, strict=False, jit_options=_INLINED)
+    def choose(axes: Any, *arguments: Any) -> Any:
+        choice = choices.get(len(axes))
+        if choice is None:
+            return lambda axes, *arguments: None
+
+        def call(axes: Any, *arguments: Any) -> None:
+            choice(axes, *arguments)
+
+        return call
+
+    return chosen
+
+
 @contextmanager
 def compile_notice(what: str) -> Iterator[None]:
     """Says on stderr that kernels are being compiled when the block takes over a second."""
-    notice = f"hose_mj: compiling the {what} (once on this machine, under 30 s) ...\n"
+    notice = f"hose_mj: compiling the {what} (once on this machine, under a minute) ...\n"
     timer = threading.Timer(1.0, lambda: sys.stderr.write(notice))
     timer.daemon = True
     timer.start()

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import inlined, kernel
+from hose_mj.compiled import choose_by_unknowns, inlined, kernel
 from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
 from hose_mj.hoses.geds.frames import move_clamp_frames
 from hose_mj.hoses.geds.frenet import add_frenet, compute_frenet_energy
@@ -99,11 +99,8 @@ def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped
 
 
 @inlined
-def _scatter(axes, tables, e, axial, has_linear_mode, has_turn, p, gradient, band):  # type: ignore[no-untyped-def]
-    """Adds the span's force to the gradient and its stiffness to the band.
-
-    `has_turn`: whether the Gauss points know forces on theta.
-    """
+def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # type: ignore[no-untyped-def]
+    """Adds the span's force to the gradient and its stiffness to the band."""
     d = len(axes)
     start = e * d
     for c in range(len(axes[:3])):
@@ -128,9 +125,6 @@ def _scatter(axes, tables, e, axial, has_linear_mode, has_turn, p, gradient, ban
             if has_linear_mode:
                 _add_outer(1, c1, c2, axial, p)
             _add_block(d, start, c1, c2, block, band)
-    if d == 4 and has_turn:
-        _scatter_force(tables.first, tables.value, e, 4, 3, p, gradient)
-        _scatter_turn(tables, e, p, band)
 
 
 @inlined
@@ -194,6 +188,64 @@ def _add_outer(mode, c1, c2, axial, p):  # type: ignore[no-untyped-def]
         p.block[4 * i + 3] += along * m3
 
 
+@inlined
+def _set_isotropic(axes, elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[no-untyped-def]
+    """Sets force and stiffness of Gauss point g of a hose that bends alike in every direction."""
+    tau = elasticity.damping_time
+    bending = weight * elasticity.bending_stiffness[e, g]
+    set_bending(axes[:3], g, bending, exact, (1.0 - exact) + tau / step, p)
+    if tau != 0.0:
+        add_bending_viscosity(axes[:3], g, bending * tau, p)
+    if len(axes) == 2 and elasticity.rest_curvature[e, g] != 0.0:
+        add_rest_curvature(g, -bending * elasticity.rest_curvature[e, g], exact, p)
+
+
+@inlined
+def _set_turning(axes, elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[no-untyped-def]
+    """Sets force and stiffness of Gauss point g of a hose with theta."""
+    if elasticity.frenet:
+        _set_isotropic(axes, elasticity, frames, e, g, weight, exact, step, p)
+    else:
+        set_rod(elasticity, frames, e, g, weight, exact, step, p)
+
+
+@inlined
+def _add_turning(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):  # type: ignore[no-untyped-def]
+    """Adds what span e does to theta to the gradient and the band."""
+    if hose.elasticity.frenet:
+        add_frenet(hose.tables, hose.elasticity, e, rate, step, exact, p, gradient, band)
+    else:
+        _scatter_force(hose.tables.first, hose.tables.value, e, 4, 3, p, gradient)
+        _scatter_turn(hose.tables, e, p, band)
+
+
+@inlined
+def _add_scalar(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):  # type: ignore[no-untyped-def]
+    """Adds the scalar twist of span e."""
+    add_twist(axes, hose.tables, twist, e, exact, x, p)
+
+
+@inlined
+def _close_scalar(axes, hose, twist, progress, rate, step, x, gradient):  # type: ignore[no-untyped-def]
+    """Adds the force of the scalar twist, now that its angle is known."""
+    tau = hose.elasticity.damping_time
+    close_stretches(twist, np.isinf(step), progress, tau, rate, gradient)
+
+
+@inlined
+def _close_turning(axes, hose, twist, progress, rate, step, x, gradient):  # type: ignore[no-untyped-def]
+    """Takes the frames at the clamps along."""
+    if not hose.elasticity.frenet:
+        move_clamp_frames(axes, twist, x)
+
+
+_open_twist = choose_by_unknowns({3: open_stretches})
+_set_section = choose_by_unknowns({2: _set_isotropic, 3: _set_isotropic, 4: _set_turning})
+_add_moment = choose_by_unknowns({3: _add_scalar})
+_scatter_theta = choose_by_unknowns({4: _add_turning})
+_close_twist = choose_by_unknowns({3: _close_scalar, 4: _close_turning})
+
+
 @kernel
 def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, band):  # type: ignore[no-untyped-def]
     """Adds strain energy and Kelvin-Voigt terms: dU + C rate to `gradient`, K + C / step to `band`.
@@ -218,10 +270,7 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
     n_spans = tables.first.shape[0]
     tau = elasticity.damping_time
     scale = 1.0 if exact else 0.0
-    viscous = (1.0 - scale) + tau / step
-    has_frames = len(axes) == 4 and not elasticity.frenet
-    if len(axes) == 3:
-        open_stretches(axes, twist, x)
+    _open_twist(axes, twist, x)
     for e in range(n_spans):
         load_span(axes, tables, e, x, p)
         has_linear_mode = e == 0 or e == n_spans - 1
@@ -237,27 +286,14 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
         stiffness = elasticity.axial_stiffness[e]
         for g in range(3):
             weight = tables.weights[g] * tables.span_length
-            if has_frames:
-                set_rod(elasticity, twist.frames, e, g, weight, scale, step, p)
-            else:
-                bending = weight * elasticity.bending_stiffness[e, g]
-                set_bending(axes[:3], g, bending, scale, viscous, p)
-                if tau != 0.0:
-                    add_bending_viscosity(axes[:3], g, bending * tau, p)
-                if len(axes) == 2 and elasticity.rest_curvature[e, g] != 0.0:
-                    add_rest_curvature(g, -bending * elasticity.rest_curvature[e, g], scale, p)
+            _set_section(axes, elasticity, twist.frames, e, g, weight, scale, step, p)
             tension = stiffness * (mean + tau * mean_rate)
             if has_linear_mode:
                 tension += stiffness * tables.linear[g] * (linear + tau * linear_rate)
             keep = 1.0 if exact or tension > 0.0 else 0.0
             _add_tension(axes, g, weight, tension, keep, p)
-        if len(axes) == 3:
-            add_twist(axes, tables, twist, e, scale, x, p)
+        _add_moment(axes, hose, twist, e, rate, step, scale, x, p, gradient, band)
         axial = stiffness * tables.span_length * (1.0 + tau / step)
-        _scatter(axes, tables, e, axial, has_linear_mode, has_frames, p, gradient, band)
-        if len(axes) == 4 and elasticity.frenet:
-            add_frenet(tables, elasticity, e, rate, step, scale, p, gradient, band)
-    if has_frames:
-        move_clamp_frames(axes, twist, x)
-    if len(axes) == 3:
-        close_stretches(twist, np.isinf(step), progress, tau, rate, gradient)
+        _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band)
+        _scatter_theta(axes, hose, twist, e, rate, step, scale, x, p, gradient, band)
+    _close_twist(axes, hose, twist, progress, rate, step, x, gradient)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel, merged
+from hose_mj.compiled import choose_by_unknowns, compiled, kernel, merged
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.solver import (
@@ -137,15 +137,31 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
 
 
 @kernel
+def _accept_scalar(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
+    accept_twist(axes, holds.twist, state.x)
+
+
+@kernel
+def _restore_scalar(axes, twist):  # type: ignore[no-untyped-def]
+    start_twist(twist)
+
+
+@kernel
+def _restore_frames(axes, twist):  # type: ignore[no-untyped-def]
+    restore_frames(twist)
+
+
+_accept = choose_by_unknowns({3: _accept_scalar, 4: accept_frames})
+_restore = choose_by_unknowns({3: _restore_scalar, 4: _restore_frames})
+
+
+@kernel
 def start_step(axes, holds, dt):  # type: ignore[no-untyped-def]
     """Returns twist and frames to the last accepted state; sets the clamps' rates of spin."""
     twist = holds.twist
     for clamp in range(len(twist.starts)):
         twist.spin[clamp, 1] = twist.spin[clamp, 0] / dt
-    if len(axes) == 3:
-        start_twist(twist)
-    elif len(axes) == 4:
-        restore_frames(twist)
+    _restore(axes, twist)
 
 
 @merged
@@ -259,8 +275,5 @@ def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts
         for row in range(len(holds.start)):
             holds.multipliers[row] = work.multipliers[row]
             holds.before[row] = holds.after[row]
-        if len(axes) == 3:
-            accept_twist(axes, holds.twist, state.x)
-        elif len(axes) == 4:
-            accept_frames(axes, hose, holds, state, work.span)
+        _accept(axes, hose, holds, state, work.span)
     return DONE

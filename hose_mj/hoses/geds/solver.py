@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel, merged
+from hose_mj.compiled import choose_by_unknowns, compiled, kernel, merged
 from hose_mj.hoses.geds.band import (
     factorize,
     factorize_indefinite,
@@ -531,6 +531,14 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
 
 
 @kernel
+def _shift(axes, twist, fraction, shift):  # type: ignore[no-untyped-def]
+    shift_clamps(twist, fraction, shift)
+
+
+_shift_clamps = choose_by_unknowns({4: _shift})
+
+
+@kernel
 def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-untyped-def]
     """Writes g - G x into work.shift and adds the holds' weight to the matrix."""
     width = 4 * len(axes)
@@ -540,7 +548,6 @@ def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-u
         for k in range(width):
             value -= holds.rows[row, k] * x[holds.start[row] + k]
         work.shift[row] = value
-    if len(axes) == 4:
-        shift_clamps(holds.twist, fraction, work.shift)
+    _shift_clamps(axes, holds.twist, fraction, work.shift)
     if weight > 0.0:
         _add_hold_weight(axes, holds, weight, len(x), work)

@@ -5,7 +5,7 @@ import pytest
 
 from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, frames, mechanics, stretches, twist
+from hose_mj.hoses.geds import basis, mechanics, stretches, twist
 from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
@@ -114,9 +114,9 @@ def test_theta_settles_to_the_spin_that_was_done_while_running():
     assert hose.torque(0.5)[0] > 2.5 * GJ
     hose.release(last)
     hose.step(1000)
-    # What frames have gathered before they are laid anew is no part of theta's splines: it stays.
-    gathered = frames.LARGEST_GATHERED / (1.0 / (12 - 3))
-    np.testing.assert_allclose(hose.torque([0.1, 0.5, 0.9]), 0.0, atol=GJ * gathered)
+    # What frames have gathered since they were laid is not in theta's splines: some of it stays.
+    np.testing.assert_allclose(hose.torque([0.1, 0.5, 0.9]), 0.0, atol=0.02 * GJ)
+    assert hose.energies().twisting < 1e-5 * 0.5 * GJ * 3.0**2
 
 
 def test_damping_adds_the_torque_of_the_spin_s_rate():
@@ -283,7 +283,7 @@ def test_reactions_balance_the_weight(form):
     force, fine = compute_balance(24, form)
     assert force < 1e-7
     assert fine < 1e-4
-    assert fine < coarse / 8
+    assert fine < coarse / 4
 
 
 def measure_variation_error(n):

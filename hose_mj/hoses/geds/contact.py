@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
+from hose_mj.compiled import compiled, inlined, kernel
 from hose_mj.hoses.geds.contact_law import (
     DAMPING,
     WIDTH,
@@ -30,7 +30,7 @@ def _relate(velocity, surface):  # type: ignore[no-untyped-def]
     return velocity[0] - surface[0], velocity[1] - surface[1], velocity[2] - surface[2]
 
 
-@kernel
+@inlined
 def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):  # type: ignore[no-untyped-def]
     """Adds contact to the residual and its matrix; returns how many contact points touch.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import choose_by_unknowns, compiled, kernel, merged
+from hose_mj.compiled import choose_by_unknowns, compiled, inlined, merged
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.solver import (
@@ -67,7 +67,7 @@ ATTEMPTS = 5
 """The scheme as asked; backward Euler with a line search in 1, 8, 64 and 512 parts of the step."""
 
 
-@kernel
+@inlined
 def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-def]
     """Writes X, V and the guess x of a stage; returns its length h and where in the step it ends.
 
@@ -136,17 +136,17 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
     return DONE, h
 
 
-@kernel
+@inlined
 def _accept_scalar(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
     accept_twist(axes, holds.twist, state.x)
 
 
-@kernel
+@inlined
 def _restore_scalar(axes, twist):  # type: ignore[no-untyped-def]
     start_twist(twist)
 
 
-@kernel
+@inlined
 def _restore_frames(axes, twist):  # type: ignore[no-untyped-def]
     restore_frames(twist)
 
@@ -155,7 +155,7 @@ _accept = choose_by_unknowns({3: _accept_scalar, 4: accept_frames})
 _restore = choose_by_unknowns({3: _restore_scalar, 4: _restore_frames})
 
 
-@kernel
+@inlined
 def start_step(axes, holds, dt):  # type: ignore[no-untyped-def]
     """Returns twist and frames to the last accepted state; sets the clamps' rates of spin."""
     twist = holds.twist

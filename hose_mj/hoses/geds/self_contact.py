@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
+from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.contact import press, scatter
 from hose_mj.hoses.geds.contact_law import (
     RADIUS,
@@ -84,7 +84,7 @@ def _are_spans_apart(contact, e, f):  # type: ignore[no-untyped-def]
     return square > reach * reach
 
 
-@kernel
+@inlined
 def add_self_contact(axes, contact, x, rate, step, gradient, band):  # type: ignore[no-untyped-def]
     """Adds the forces of a hose on itself to the residual and what is on the band to the matrix.
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import choose_by_unknowns, compiled, kernel, merged
+from hose_mj.compiled import choose_by_unknowns, compiled, inlined, kernel, merged
 from hose_mj.hoses.geds.band import (
     factorize,
     factorize_indefinite,
@@ -175,7 +175,7 @@ def make_work(n_control_points, dimension, n_rows):  # type: ignore[no-untyped-d
     )
 
 
-@kernel
+@inlined
 def multiply_mass(axes, hose, factor, x, out):  # type: ignore[no-untyped-def]
     """Adds factor M x to out; x and out flat, the first n d entries count."""
     d = len(axes)
@@ -193,7 +193,7 @@ def multiply_mass(axes, hose, factor, x, out):  # type: ignore[no-untyped-def]
                 out[j * d + c] += scale * x[(j + k) * d + c]
 
 
-@kernel
+@inlined
 def add_mass(axes, hose, factor, band):  # type: ignore[no-untyped-def]
     """Adds factor M to a band."""
     d = len(axes)
@@ -204,7 +204,7 @@ def add_mass(axes, hose, factor, band):  # type: ignore[no-untyped-def]
                 band[j * d + c, k * d] += scale * hose.mass[j, k]
 
 
-@kernel
+@inlined
 def add_moments(axes, loads, exact, x, work):  # type: ignore[no-untyped-def]
     """Subtracts the generalised force of the point moments, M x a / A on a = r', from the gradient.
 
@@ -293,7 +293,7 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):  # 
     return add_contact(axes, contact, x, work.rate, V, h, exact, work.gradient, work.band)
 
 
-@kernel
+@inlined
 def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untyped-def]
     """Adds weight G^T G to the band and G^T (g - G x) to the right-hand side; lambda is the same.
 
@@ -316,7 +316,7 @@ def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untype
                 work.band[start + j, i - j] += along * holds.rows[row, i]
 
 
-@kernel
+@inlined
 def solve_with_holds(axes, holds, softness, n_negative, size, work):  # type: ignore[no-untyped-def]
     """Solves K dx - R^T lambda = -gradient, R dx + D lambda = shift with the factor in work.band.
 
@@ -417,7 +417,7 @@ def _solve_dense(m, matrix, rhs):  # type: ignore[no-untyped-def]
     return n_negative
 
 
-@kernel
+@inlined
 def _largest_turn(axes, tables, x, shift):  # type: ignore[no-untyped-def]
     """Largest angle (small-angle estimate) by which a shift of x turns a tangent."""
     d = len(axes)
@@ -441,7 +441,7 @@ def _largest_turn(axes, tables, x, shift):  # type: ignore[no-untyped-def]
     return largest
 
 
-@kernel
+@merged
 def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  # type: ignore[no-untyped-def]
     """Newton's iteration on x in place; returns (verdict, iterations, fallbacks).
 
@@ -530,7 +530,7 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
         shortened = 0
 
 
-@kernel
+@inlined
 def _shift(axes, twist, fraction, shift):  # type: ignore[no-untyped-def]
     shift_clamps(twist, fraction, shift)
 
@@ -538,7 +538,7 @@ def _shift(axes, twist, fraction, shift):  # type: ignore[no-untyped-def]
 _shift_clamps = choose_by_unknowns({4: _shift})
 
 
-@kernel
+@inlined
 def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-untyped-def]
     """Writes g - G x into work.shift and adds the holds' weight to the matrix."""
     width = 4 * len(axes)

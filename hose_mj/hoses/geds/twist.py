@@ -102,7 +102,7 @@ def carry_clamp(directors, clamp, t0, t1, t2):  # type: ignore[no-untyped-def]
     return carry(u0, u1, u2, t0, t1, t2, d[clamp, 3], d[clamp, 4], d[clamp, 5])
 
 
-@kernel
+@inlined
 def start_twist(twist):  # type: ignore[no-untyped-def]
     """Begins a step or a solve anew from the last accepted state."""
     for k in range(len(twist.angle)):
@@ -202,7 +202,7 @@ def find_angle(twist, k, near):  # type: ignore[no-untyped-def]
     twist.trial[k] = angle + turn * np.round((near - angle) / turn)
 
 
-@kernel
+@inlined
 def close_stretches(twist, in_statics, fraction, tau, rate, gradient):  # type: ignore[no-untyped-def]
     """Finds Phi and the moment of each stretch, and adds the moment's force to the gradient.
 
@@ -231,7 +231,7 @@ def close_stretches(twist, in_statics, fraction, tau, rate, gradient):  # type: 
             gradient[i] += twist.torque[k] * twist.rows[k, i]
 
 
-@kernel
+@inlined
 def predict_twist(twist, factor, step):  # type: ignore[no-untyped-def]
     """Foresees Phi after the shape has moved by factor times step."""
     for k in range(len(twist.angle)):
@@ -239,7 +239,7 @@ def predict_twist(twist, factor, step):  # type: ignore[no-untyped-def]
             twist.trial[k] += factor * twist.rows[k, i] * step[i]
 
 
-@kernel
+@inlined
 def accept_twist(axes, twist, x):  # type: ignore[no-untyped-def]
     """Ends a step: Phi becomes the last iterate's, the clamps' directors go along with the hose."""
     for k in range(len(twist.angle)):

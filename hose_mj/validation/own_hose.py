@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +11,7 @@ from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.model import Array, Hold, HoseModel
 from hose_mj.hoses.obstacles import Obstacle
-from hose_mj.hoses.registry import MODELS, make_hose
+from hose_mj.hoses.registry import make_hose
 from hose_mj.scenes.own_hold import HeldPlace
 from hose_mj.scenes.own_hose import OwnHose
 from hose_mj.validation.case import Case, Motion
@@ -24,14 +22,11 @@ N_PROBES = 17
 """Places along the hose at which models are compared."""
 REST_POINTS = 48
 """Control points of the rest shape from which all models start, times `find_fineness`."""
-FEWEST_SEGMENTS = 10
-"""The coarsest chain that is run."""
 _FIRST_MODE = 3.5
 """omega L^2 sqrt(rho A / EI) of a clamped-free beam."""
 _PUSH = 1e-3
 """By this fraction of the length the hose is bent aside before it comes to rest."""
 _STEPS_TO_REST = 400
-_SOME_SPIN = 1e-3
 _FLAT = 1e-6
 _PAUSE = 0.04
 _FEWEST, _MOST = 25, 500
@@ -185,35 +180,6 @@ def is_planar(own: OwnHose) -> bool:
     turned = any(load.moment[0] or load.moment[2] for load in own.loads)
     straight = own.spec.is_isotropic and own.spec.rest_torsion == 0.0
     return flat and not turned and not own.spins and straight
-
-
-def find_obstacle(own: OwnHose, model: str) -> InputError | None:
-    """Why a model cannot run this hose, or None."""
-    options: dict[str, Any] = {} if model == "geds" else {"segments": FEWEST_SEGMENTS}
-    if own.floor is not None:
-        why = _find_floor_obstacle(own, model)
-        if why is not None:
-            return InputError("floor", own.floor.height, f"left out: {why}")
-        options["obstacles"] = make_obstacles(own)
-    try:
-        hose = make_hose(model, own.spec, gravity=own.gravity, timestep=1e-3, **options)
-    except InputError as error:
-        return InputError(f"hose.{error.thing}", error.value, f"for {model} {error.valid}")
-    if own.spins:
-        try:
-            hose.move(hose.clamp(0.0), spin=_SOME_SPIN)
-        except InputError as error:
-            return InputError("spin", "given", f"left out: {model} takes {error.valid}")
-    return None
-
-
-def _find_floor_obstacle(own: OwnHose, model: str) -> str | None:
-    """Why a model cannot lie on a floor here, or None."""
-    if "obstacles" not in inspect.signature(MODELS[model].load()).parameters:
-        return f"{model} touches nothing"
-    if model != "geds" and starts_at_rest(own):
-        return f"only geds finds a rest shape on it; {model} runs with study.start = 'as-laid'"
-    return None
 
 
 def describe(own: OwnHose) -> str:

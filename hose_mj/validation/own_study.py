@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -19,7 +18,9 @@ from hose_mj.validation.own_answers import (
     list_answers,
     list_disagreements,
 )
-from hose_mj.validation.own_hose import CASE_ID, find_fineness, find_obstacle, make_case
+from hose_mj.validation.own_grid import GRID, can_spin, count_parts, list_own_steps, make_grid
+from hose_mj.validation.own_hose import CASE_ID, find_fineness, make_case
+from hose_mj.validation.own_refusals import find_obstacle
 from hose_mj.validation.run import (
     BUDGET_SPENT,
     REFERENCE_POINTS,
@@ -33,37 +34,15 @@ from hose_mj.validation.run import (
     time_rounds,
 )
 from hose_mj.validation.settings import (
-    LARGEST_STEP,
     SMALLEST_STEP,
     Grid,
     Setting,
-    find_largest_step,
     list_ladders,
     list_static,
 )
 
 OWN_MODELS = ("geds", "cable", "flex")
 """Models that a user's hose is compared with, those of them that there are."""
-GRID = Grid(
-    static={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40), "flex": (10, 20, 40)},
-    dynamic={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40, 80), "flex": (10, 20, 40, 80)},
-    schemes={
-        "geds": ("bdf2", "bdf2, planar"),
-        "cable": ("euler", "rk4"),
-        "flex": ("discrete",),
-    },
-    smallest_geds_step=5e-4,
-    longest_ladder=4,
-    longest_flex_ladder=4,
-    longest_run=math.inf,
-    longest_timed_run=0.5,
-    rounds=2,
-    reference_steps=(0, 0),
-)
-"""Of a user's hose; the longest run and the reference's steps depend on budget and motion.
-
-GEDS's control points are these times `find_fineness`.
-"""
 REFERENCE_STEP = 2e-3
 """The first reference takes steps of about this length (s)."""
 MOST_REFERENCE_POINTS = 192
@@ -124,16 +103,6 @@ class OwnStudy:
 def list_own_models() -> tuple[str, ...]:
     """The models that can be asked for."""
     return tuple(model for model in OWN_MODELS if model in MODELS)
-
-
-def make_grid(own: OwnHose) -> Grid:
-    """The settings for a hose: GEDS's control points grow with the turns of a coil."""
-
-    def refine(resolutions: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
-        geds = tuple(find_fineness(own) * points for points in resolutions["geds"])
-        return {**resolutions, "geds": geds}
-
-    return replace(GRID, static=refine(GRID.static), dynamic=refine(GRID.dynamic))
 
 
 def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], None]) -> OwnStudy:
@@ -210,7 +179,7 @@ def _find_references(
 
 def _compute_limit(case: Case, points: int, level: int, *, stretchable: bool) -> Reference:
     if case.motion is not None:
-        parts = _count_parts(case.motion.pause, REFERENCE_STEP)
+        parts = count_parts(case.motion.pause, REFERENCE_STEP)
         steps = 4 * parts * 2**level
         grid = replace(GRID, reference_steps=(steps, steps))
         return compute_reference(case, grid, stretchable=stretchable, points=points)
@@ -256,7 +225,7 @@ def _run_motion(
     ladders.sort(key=lambda ladder: _rank(ladder[0], grid.dynamic))
     fastest = max((spin.fastest for hold in own.holds for spin in hold.spins), default=0.0)
     for whole in ladders:
-        ladder = [setting for setting in whole if _can_spin(setting, fastest)]
+        ladder = [setting for setting in whole if can_spin(setting, fastest)]
         if not ladder:
             result.skipped.append(
                 Skipped(CASE_ID, whole[-1], "a clamp turns by half and more in a step")
@@ -278,30 +247,6 @@ def _run_motion(
         result.skipped += skipped
     advance("timing")
     time_rounds(result.case, result.outcomes, grid, own.errors, deadline + _EXTRA * own.budget)
-
-
-def _can_spin(setting: Setting, rate: float) -> bool:
-    """Whether a clamp that turns so fast (rad/s) may do so in this setting: see `HoseModel.move`."""
-    assert setting.timestep is not None
-    return setting.model == "geds" or rate * setting.timestep < math.pi
-
-
-def list_own_steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:
-    """Time steps (s) that divide the pause between samples, each half of the one before."""
-    assert case.motion is not None
-    pause = case.motion.pause
-    first = pause / _count_parts(pause, LARGEST_STEP)
-    least, most = grid.smallest_geds_step, math.inf
-    if model != "geds":
-        least, most = SMALLEST_STEP, find_largest_step(scheme, resolution, case)
-    count = max(1, math.floor(math.log2(first / least)) + 1)
-    steps = [first / 2**k for k in range(count)]
-    return [step for step in steps if step < most] or steps[-1:]
-
-
-def _count_parts(pause: float, longest: float) -> int:
-    """The power of two, 2 at least, that cuts a pause into steps no longer than `longest` (s)."""
-    return int(2 ** max(1, math.ceil(math.log2(pause / longest) - 1e-9)))
 
 
 def _rank(setting: Setting, resolutions: Mapping[str, tuple[int, ...]]) -> tuple[bool, int]:

@@ -50,7 +50,7 @@ def make_grid(own: OwnHose) -> Grid:
 
 
 def can_spin(setting: Setting, rate: float) -> bool:
-    """Whether a clamp that turns so fast (rad/s) may do so in this setting: see `HoseModel.move`."""
+    """Whether a clamp may turn so fast (rad/s) in this setting: see `HoseModel.move`."""
     assert setting.timestep is not None
     return setting.model == "geds" or rate * setting.timestep < math.pi
 

@@ -147,7 +147,7 @@ def _add_second_derivatives(tables, e, g, stress, torsion, p, band):  # type: ig
 
 @kernel
 def _compute_second(tables, g, k, c1, m, c2, torsion, p):  # type: ignore[no-untyped-def]
-    """D times the second derivative of tau by coordinate c1 of a, b or c (k) and c2 of another (m)."""
+    """D times the second derivative of tau by coordinates c1 of a, b or c (k) and c2 (of m)."""
     s = p.strains
     second = -(s[k, 0, c1] * s[m, 1, c2] + s[k, 1, c1] * s[m, 0, c2])
     if k != m and c1 != c2:

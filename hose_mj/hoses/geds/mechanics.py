@@ -190,7 +190,8 @@ def compute_twist(spline: Spline, hose: solver.Hose, stretches: Twist, s: Array,
     """Returns the twist beyond its rest (k,), rad/m, at arc lengths s (k,)."""
     if hose.elasticity.frenet:
         rest = hose.elasticity.rest_torsion[0, 0]
-        return spline.evaluate_theta(s, x, 1) + compute_torsion(spline, hose, s, x) - rest
+        torsion = compute_torsion(spline, hose, s, x)
+        return np.asarray(spline.evaluate_theta(s, x, 1) + torsion - rest)
     if spline.has_theta:
         length = spline.length / len(hose.tables.first)
         nodes = np.cumsum(np.tile(hose.tables.gaps, len(hose.tables.first))) * length

@@ -176,7 +176,7 @@ def test_random_hoses_are_held_and_loaded(hoses):
     sizes = [np.linalg.norm(force) / WEIGHT for forces in loads for _, force in forces]
     assert 90.0 < max(sizes) <= 100.0
     n_holds = [len(hose.snapshot()["holds"]["held"]) for hose in hoses]
-    assert set(n_holds) == {0, 1, 2}
+    assert {0, 1, 2} <= set(n_holds) <= {0, 1, 2, 3}
 
 
 def test_half_of_the_random_hoses_move_in_a_plane(hoses):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from hose_mj.assets import find_asset
-from hose_mj.errors import InputError
 from hose_mj.hoses.registry import make_hose
 from hose_mj.scenes.own_hold import HeldPlace, Movement, Spin
 from hose_mj.scenes.own_hose import Floor, PointLoad, read_own_hose
-from hose_mj.validation import own_hose, reference
+from hose_mj.validation import reference
 from hose_mj.validation.case import BENDING_STIFFNESS, LENGTH, LINEAR_DENSITY, STOUT
-from hose_mj.validation.own_hose import describe, find_obstacle, find_rest, is_planar, make_case
+from hose_mj.validation.own_hose import describe, find_rest, is_planar, make_case
+from hose_mj.validation.own_refusals import find_obstacle
 
 GARDEN = read_own_hose(find_asset("hoses/garden_hose.toml"))
 CLAMP = HeldPlace(0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
@@ -105,48 +105,19 @@ def test_a_thread_too_light_for_mujoco_is_refused():
     assert find_obstacle(light, "geds") is None
 
 
-class Plain:
-    """A model without a floor, whose clamps do not turn."""
-
-    def __init__(self, spec, *, timestep, gravity):
-        if spec.rest_torsion:
-            raise InputError("rest_torsion", spec.rest_torsion, "0")
-
-    def move(self, hold, position=None, tangent=None):
-        raise NotImplementedError
-
-
-class Able(Plain):
-    """A model with both."""
-
-    def add_floor(self, height, friction):
-        self.floor = (height, friction)
-
-    def move(self, hold, position=None, tangent=None, spin=None):
-        raise NotImplementedError
-
-
-@pytest.mark.parametrize(
-    ("changes", "what"),
-    [
-        ({"floor": Floor(0.0, 0.3)}, "floor is 0.0; valid: left out: geds has no floor yet"),
-        (
-            {"holds": (replace(CLAMP, spins=(Spin(0, 1, "linear", 1.0),)),)},
-            "spin is 'given'; valid: left out: geds cannot turn a clamp yet",
-        ),
-    ],
-)
-def test_a_model_that_cannot_says_so(monkeypatch, changes, what):
-    own, kinds = replace(CANTILEVER, **changes), {"geds": Plain}
-    entry = type("Entry", (), {"load": lambda self: kinds["geds"]})()
-    monkeypatch.setattr(own_hose, "MODELS", {"geds": entry})
-    monkeypatch.setattr(own_hose, "make_hose", lambda model, spec, **o: kinds[model](spec, **o))
-    assert str(find_obstacle(own, "geds")) == what
-    kinds["geds"] = Able
-    assert find_obstacle(own, "geds") is None
-    coiled = replace(own, spec=replace(STOUT, rest_torsion=2.0))
-    obstacle = find_obstacle(coiled, "geds")
-    assert str(obstacle) == "hose.rest_torsion is 2.0; valid: for geds 0"
+def test_a_model_that_cannot_says_so():
+    on_floor = replace(CANTILEVER, floor=Floor(-2.0, 0.3), duration=1.0)
+    turned = replace(CANTILEVER, holds=(replace(CLAMP, spins=(Spin(0, 1, "linear", 1.0),)),))
+    for own in (on_floor, turned):
+        assert find_obstacle(own, "geds") is None
+        assert find_obstacle(own, "cable") is None
+    assert str(find_obstacle(on_floor, "flex")) == (
+        "floor is -2.0; valid: left out: flex touches nothing"
+    )
+    assert str(find_obstacle(turned, "flex")).startswith("spin is 'given'; valid: left out: flex")
+    at_rest = replace(on_floor, start="equilibrium")
+    assert "only geds finds a rest shape" in str(find_obstacle(at_rest, "cable"))
+    assert find_obstacle(at_rest, "geds") is None
 
 
 def test_a_chain_refuses_what_it_cannot_be():

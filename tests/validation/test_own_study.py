@@ -12,7 +12,7 @@ from hose_mj.errors import InputError
 from hose_mj.scenes.own_hose import Floor, read_own_hose
 from hose_mj.validation import own_study
 from hose_mj.validation.own_answers import list_answers, list_disagreements
-from hose_mj.validation.own_hose import put
+from hose_mj.validation.own_hose import make_case
 from hose_mj.validation.own_study import (
     GRID,
     list_own_models,
@@ -149,12 +149,7 @@ def test_the_garden_hose():
     assert cable > 0.5 * study.stretch
 
 
-def test_floor_reaches_a_model_that_has_one():
-    asked = []
-
-    class Hose:
-        def __getattr__(self, name):
-            return lambda *values, **named: asked.append((name, named))
-
-    put(replace(USB, floor=Floor(-1.0, 0.3), holds=()), Hose(), None)
-    assert ("add_floor", {"height": -1.0, "friction": 0.3}) in asked
+def test_the_floor_is_an_obstacle_of_the_case():
+    case = make_case(replace(USB, floor=Floor(-1.0, 0.3), duration=1.0, start="as-laid"))
+    (floor,) = case.obstacles
+    assert (floor.kind, floor.position[2], floor.friction) == ("plane", -1.0, 0.3)

@@ -48,7 +48,7 @@ class Args:
     out: Path = Path("out/compare")
     """Folder for the report, the plots, the numbers and the recording."""
     quick: bool = False
-    """A smaller grid: the cable at 20 and 40 segments, about two minutes once compiled. For your own hose:
+    """A smaller grid, about two minutes once compiled. For your own hose:
     a third of its budget."""
     json: bool = False
     """Print one JSON document on stdout; messages go to stderr."""

@@ -23,9 +23,9 @@ SPEC = HoseSpec(
 
 
 def draw_twist() -> bytes:
-    """Returns the PNG: twist along a clamped S that bulges out of its plane by 2 % of its length.
+    """Returns the PNG: twist along an S that bulges out of its plane by 2 % of its length.
 
-    Both hoses are laid free of torque, each as its strain understands it.
+    Both hoses are as `reset` lays them: theta at its rest, whatever each form measures it from.
     """
     phase = np.linspace(0.0, 1.0, 2001)
     points = np.stack(

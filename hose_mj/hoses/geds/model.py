@@ -115,7 +115,7 @@ class GedsHose(Touching, SplineBody):
     ) -> None:
         """Lays the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
 
-        The material is laid free of torque.
+        The material is laid free of torque, but for twist="frenet" (docs/frenet.md).
 
         Args:
             curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.

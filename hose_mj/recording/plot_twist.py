@@ -19,7 +19,6 @@ def plot_twist(
     shape: ArrayLike,
     twists: Mapping[str, ArrayLike],
     knots: ArrayLike = (),
-    limit: float | None = None,
 ) -> bytes:
     """Shape above, twist below, over one axis of arc length.
 
@@ -29,7 +28,6 @@ def plot_twist(
         shape: the centre line there (k, 3), m, of which y and z are drawn.
         twists: label to twist (k,), rad/m.
         knots: arc lengths marked by thin lines.
-        limit: half the height of the lower axes (rad/m); None for all of it.
 
     Raises:
         InputError: nothing to draw, or shapes that do not fit.
@@ -54,8 +52,6 @@ def plot_twist(
             ends.append((float(twist[-1]), name_model(label), looks[label].ink))
         for knot in np.ravel(knots):
             below.axvline(knot, color=SOFT, lw=0.5, ls=(0, (1, 3)), zorder=0)
-        if limit is not None:
-            below.set_ylim(-limit, limit)
         below.set_xlim(float(np.min(s)), float(np.max(s)))
         below.set_xlabel("arc length (m)")
         below.set_ylabel("twist (rad/m)")

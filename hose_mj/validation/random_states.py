@@ -64,9 +64,10 @@ def make_random_hose(rng: np.random.Generator) -> GedsHose:
     )
     hose.set_control_points(_draw_polygon(hose.control_points, plane, rng))
     if rng.random() < 0.5:
-        hose.clamp(0.0, tangent=(1.0, 0.0, 0.0))
+        hose.clamp(0.0, tangent=_turn_ahead(hose, 0.0, np.array([1.0, 0.0, 0.0])))
         if plane is None and rng.random() < 0.5:
-            far = hose.clamp(spec.length, tangent=rng.normal(size=3))
+            aim = _turn_ahead(hose, spec.length, rng.normal(size=3))
+            far = hose.clamp(spec.length, tangent=aim)
             hose.move(far, spin=float(rng.uniform(-2.0, 2.0) * np.pi))
     if rng.random() < 0.5:
         hose.attach(float(rng.uniform(0.2, 1.0)))
@@ -93,6 +94,11 @@ def set_random_obstacles(hose: GedsHose, rng: np.random.Generator) -> None:
     self_contact = bool(rng.random() < 0.5)
     law = ContactLaw(stiffness=stiffness, slip_speed=slip_speed, self_contact=self_contact)
     hose.set_obstacles(obstacles, law)
+
+
+def _turn_ahead(hose: GedsHose, arc_length: float, aim: Array) -> Array:
+    """The vector (3,) or its opposite, whichever is within 90 degrees of the hose's tangent."""
+    return -aim if aim @ hose.tangent(arc_length)[0] < 0.0 else aim
 
 
 def _draw_polygon(polygon: Array, plane: str | None, rng: np.random.Generator) -> Array:

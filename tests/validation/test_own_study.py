@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from hose_mj.assets import find_asset
@@ -12,7 +14,7 @@ from hose_mj.errors import InputError
 from hose_mj.scenes.own_hose import Floor, read_own_hose
 from hose_mj.validation import own_study
 from hose_mj.validation.own_answers import list_answers, list_disagreements
-from hose_mj.validation.own_hose import make_case
+from hose_mj.validation.own_hose import find_fineness, make_case
 from hose_mj.validation.own_study import (
     GRID,
     list_own_models,
@@ -20,6 +22,7 @@ from hose_mj.validation.own_study import (
     run_own_study,
 )
 from hose_mj.validation.run import Skipped
+from hose_mj.validation.settings import Setting
 
 GARDEN = read_own_hose(find_asset("hoses/garden_hose.toml"))
 USB = read_own_hose(find_asset("hoses/usb_cable.toml"))
@@ -153,3 +156,32 @@ def test_the_floor_is_an_obstacle_of_the_case():
     case = make_case(replace(USB, floor=Floor(-1.0, 0.3), duration=1.0, start="as-laid"))
     (floor,) = case.obstacles
     assert (floor.kind, floor.position[2], floor.friction) == ("plane", -1.0, 0.3)
+
+
+@pytest.mark.parametrize(("name", "turns"), [("telephone_cord", 10.0), ("fire_hose", 0.0)])
+def test_a_coil_and_a_ribbon_come_to_rest(name, turns):
+    own = read_own_hose(find_asset(f"hoses/{name}.toml"))
+    fineness = find_fineness(own)
+    assert fineness == max(1, math.ceil(turns / 2.0))
+    case = make_case(own)
+    found = []
+    for n in (24, 48):
+        hose = Setting("geds", "statics", n * fineness).make(case)
+        case.lay(hose)
+        found.append(case.probe(hose))
+    # Held at its first place, and the coarse hose agrees with the one twice as fine.
+    np.testing.assert_allclose(found[1][:3], own.holds[0].position, atol=1e-9)
+    assert np.max(np.abs(found[1] - found[0])) < 0.01 * own.spec.length
+
+
+def test_a_director_decides_which_way_a_ribbon_is_stiff():
+    own = read_own_hose(find_asset("hoses/fire_hose.toml"))
+    drops = []
+    # m1 across: the flat side is up, as by default. m1 up: it lies on edge, and twists over.
+    for director in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
+        case = make_case(replace(own, holds=(replace(own.holds[0], director=director),)))
+        hose = Setting("geds", "statics", 24).make(case)
+        case.lay(hose)
+        drops.append(own.holds[0].position[2] - case.probe(hose)[-1])
+    flat, on_edge = drops
+    assert flat > on_edge + 0.02 * own.spec.length

@@ -94,7 +94,8 @@ class HoldSet:
             x: the hose's unknowns.
 
         Raises:
-            InputError: a place off the hose or that another hold is at, a position off its plane.
+            InputError: a place off the hose or that another hold is at, a position off its plane, a
+                tangent more than 90 degrees from where the hose points.
         """
         spline = self._spline
         s = spline.check_place(arc_length)
@@ -105,6 +106,8 @@ class HoldSet:
             point = spline.evaluate(np.array([s]), x)[0] + spline.offset
         else:
             point = spline.check_position(position)
+        if tangent is not None:
+            _check_ahead(tangent, spline.evaluate(np.array([s]), x, 1)[0])
         hold = Hold(self._n_made, s, tangent is not None)
         n_rows = spline.dimension
         if tangent is not None:
@@ -126,7 +129,8 @@ class HoldSet:
 
         Raises:
             InputError: a hold that is not here, a vector out of the plane, a tangent or a spin for
-                an attachment, a spin in a plane; nothing has changed then.
+                an attachment, a spin in a plane, a tangent turned by more than 90 degrees at once;
+                nothing has changed then.
         """
         held = self._find(hold)
         check_number("spin", spin, may_be_negative=True)
@@ -136,6 +140,8 @@ class HoldSet:
             raise InputError("tangent", tangent, "None for an attachment (use clamp)")
         point = held.position if position is None else self._spline.check_position(position)
         aim = held.tangent if tangent is None else self._spline.check_direction(tangent)
+        if aim is not None and held.tangent is not None:
+            _check_ahead(aim, held.tangent)
         held.position, held.tangent = point, aim
         if tangent is None:
             self._aim(held, x)
@@ -334,3 +340,10 @@ class HoldSet:
             if self._spline.has_theta:
                 rows[-1, :, 3] = values[0]
         return rows.reshape(len(rows), 4 * stride)
+
+
+def _check_ahead(aim: Array, now: Array) -> None:
+    """Raises `InputError` for a tangent (3,) that points back: r' . e = 0 cannot tell its sign."""
+    if aim @ now < 0.0:
+        valid = "a direction within 90 degrees of the hose's there; turn a clamp further in steps"
+        raise InputError("tangent", aim.tolist(), valid)

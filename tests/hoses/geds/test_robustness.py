@@ -66,7 +66,8 @@ def make_random(rng):
     flat = np.array([1.0, 0.0 if plane else 1.0, 1.0])
     hose.set_control_points(draw_polygon(hose.control_points, flat, rng))
     if rng.random() < 0.5:
-        hose.clamp(0.0, tangent=[1.0, 0.0, 0.0])
+        ahead = 1.0 if hose.tangent(0.0)[0, 0] >= 0.0 else -1.0
+        hose.clamp(0.0, tangent=[ahead, 0.0, 0.0])
     if rng.random() < 0.5:
         hose.attach(float(rng.uniform(0.2, 1.0)))
     for _ in range(2):

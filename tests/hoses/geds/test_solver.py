@@ -289,3 +289,19 @@ def test_control_points_in_and_out(make_hose):
         with pytest.raises(InputError):
             hose.set_control_points(bad)
     np.testing.assert_array_equal(hose.control_points, wanted)
+
+
+@planes
+def test_a_clamp_turns_by_ninety_degrees_at_most(make_hose, plane):
+    # The rows r' . e = 0 know no sign: a hose told to point back would not, and nobody would see.
+    hose = make_hose(plane=plane, gravity=(0, 0, 0))
+    with pytest.raises(InputError, match=r"tangent is .*within 90 degrees"):
+        hose.clamp(0.0, tangent=[-1.0, 0.0, 0.1])
+    clamp = hose.clamp(0.0)
+    with pytest.raises(InputError, match="in steps"):
+        hose.move(clamp, tangent=[-0.1, 0.0, 1.0])
+    for angle in np.linspace(0.0, np.pi, 7)[1:]:
+        hose.move(clamp, tangent=[np.cos(angle), 0.0, np.sin(angle)])
+        hose.solve_static()
+    np.testing.assert_allclose(hose.tangent(0.0)[0], [-1.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(hose.position(1.0)[0], [-1.0, 0.0, 0.0], atol=1e-6)

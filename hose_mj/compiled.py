@@ -59,7 +59,7 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def decorator(function: Callable[..., Any]) -> Any:
-        made = numba.njit(**_OPTIONS, **options)(function)
+        made = numba.njit(**{**_OPTIONS, **options})(function)
         own = getattr(made._cache, "_impl", None)  # none where numba finds no place for a cache
         if own is not None and _ROOT in Path(function.__code__.co_filename).resolve().parents:
             name = f"{own.filename_base}.{_find_fingerprint(function)}"
@@ -72,6 +72,8 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 compiled = _decorate()
+# For loops that must give, bit for bit, what their source gives as plain Python: no contractions.
+bitwise = _decorate(fastmath=False, _nrt=False)
 # _nrt=False (no allocation inside) is left out of numba's types.
 kernel = _decorate(_nrt=False)
 # For small functions of a record with many fields, which a call would have to copy one by one.

@@ -1,0 +1,148 @@
+"""The modules of a learner as data (thesis, chapters 4 and 5), and the arrays made from them.
+
+A module sees some of the task's variables. A *value* module learns Q-values of some reward signals;
+with a threshold it also vetoes what lies below it (Definition 4). A *veto* module remembers which
+actions led to certain events in what it sees, and vetoes them from then on (section 5.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hose_mj.errors import InputError
+from hose_mj.tasks.kernels import Floats, Integers
+from hose_mj.tasks.task import Task
+from hose_mj.tasks.variables import LARGEST_SIZE
+
+Kind = Literal["value", "veto"]
+Credit = Literal["cycle", "own"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Module:
+    """What one module sees and learns from.
+
+    Attributes:
+        name: for messages and listings.
+        variables: names of the task's variables; none at all is a single state.
+        kind: "value" or "veto".
+        signals: reward signals that a value module adds up.
+        events: events that a veto module answers to.
+        credit: who learns from a reward or an event: everyone who acted within the "cycle", or
+            the mover for its "own" action alone.
+        threshold: a value module vetoes actions whose values lie below it; None vetoes nothing.
+        actions: the actions that a veto module is about; by default all of them.
+    """
+
+    name: str
+    variables: tuple[str, ...]
+    kind: Kind = "value"
+    signals: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
+    credit: Credit = "cycle"
+    threshold: float | None = None
+    actions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """What loops need of modules of one kind.
+
+    Attributes:
+        columns: places of the variables among all (n_modules, width).
+        strides: what a step of each adds to the key; 0 pads (n_modules, width).
+        bases: first key of each agent (n_modules, n_agents).
+        size: number of keys.
+    """
+
+    columns: Integers
+    strides: Integers
+    bases: Integers
+    size: int
+
+
+def make_arrays(task: Task, modules: Sequence[Module], n_parts: int) -> Arrays:
+    """Lays the states that the modules of one kind see one after the other.
+
+    Args:
+        task: the task.
+        modules: the modules.
+        n_parts: how many parts each has: one for each agent, or one for a team.
+
+    Raises:
+        InputError: an unknown variable, or more than 2^62 keys in all.
+    """
+    projections = [task.make_projection(module.variables) for module in modules]
+    width = max([1, *(len(p.columns) for p in projections)])
+    columns = np.zeros((len(modules), width), np.int64)
+    strides = np.zeros((len(modules), width), np.int64)
+    bases = np.zeros((len(modules), n_parts), np.int64)
+    size = 0
+    for row, projection in enumerate(projections):
+        columns[row, : len(projection.columns)] = projection.columns
+        strides[row, : len(projection.strides)] = projection.strides
+        for part in range(n_parts):
+            bases[row, part] = size
+            size += projection.size
+            if size > LARGEST_SIZE:
+                names = [m.name for m in modules]
+                raise InputError("modules", names, "modules that see fewer than 2^62 states")
+    return Arrays(columns, strides, bases, size)
+
+
+def make_module_rewards(task: Task, modules: Sequence[Module]) -> Floats:
+    """Makes what each value module is rewarded with, by events and by whose move it was.
+
+    Returns:
+        rewards (2^n_events, 2, n_modules): [events, 0] for what another agent caused (its shared
+        part), [events, 1] for one's own move.
+
+    Raises:
+        InputError: an unknown signal.
+    """
+    table = task.kernel.reward_table
+    shared = np.arange(len(table)) & task.kernel.shared
+    rewards = np.zeros((len(table), 2, len(modules)))
+    for place, module in enumerate(modules):
+        for signal in module.signals:
+            if signal not in task.rewards:
+                raise InputError("signal", signal, "one of " + ", ".join(task.rewards))
+            column = task.rewards.index(signal)
+            rewards[:, 1, place] += table[:, column]
+            if module.credit == "cycle":
+                rewards[:, 0, place] += table[shared, column]
+    return rewards
+
+
+def make_event_masks(task: Task, modules: Sequence[Module]) -> Integers:
+    """Returns the events that each veto module answers to, as bits (n_modules,).
+
+    Raises:
+        InputError: an unknown event.
+    """
+    masks = np.zeros(len(modules), np.int64)
+    for place, module in enumerate(modules):
+        for event in module.events:
+            if event not in task.events:
+                raise InputError("event", event, "one of " + ", ".join(task.events))
+            masks[place] |= 1 << task.events.index(event)
+    return masks
+
+
+def make_action_masks(task: Task, modules: Sequence[Module]) -> Integers:
+    """Returns the actions that each veto module is about, as bits (n_modules,).
+
+    Raises:
+        InputError: an unknown action.
+    """
+    masks = np.zeros(len(modules), np.int64)
+    for place, module in enumerate(modules):
+        for action in module.actions or task.action_names:
+            if action not in task.action_names:
+                raise InputError("action", action, "one of " + ", ".join(task.action_names))
+            masks[place] |= 1 << task.action_names.index(action)
+    return masks

@@ -30,6 +30,9 @@ COMMANDS = {
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
+    "reproduce": Command(
+        "tools.reproduce", "repeat the thesis's experiments over seeds, beside its numbers"
+    ),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
 }
 

@@ -3,15 +3,16 @@
 A graph has a payoff f_ij(a_i, a_j) on each edge; wanted are the actions with the highest sum. Each
 agent is restricted to what it may do, given as bits.
 
-All work on a `learning.learners.coordination.Graph` and its `Scratch`: `values` begins with the
-payoffs of the edges, in `best` the joint action is left.
+All work on a `learning.learners.graphs.Graph` and a `learning.learners.coordination.Scratch`, whose
+`values` begin with the payoffs of the edges. `maximize` is compiled for itself, so that it is found
+on disk by every learner and task.
 """
 
 from __future__ import annotations
 
 import math
 
-from hose_mj.compiled import jitable
+from hose_mj.compiled import bitwise, jitable
 from learning.policies import draw_allowed, find_best
 
 ELIMINATION, ASCENT, MAX_PLUS = 0, 1, 2
@@ -24,7 +25,7 @@ MOST_SWEEPS = 1000
 """An ascent ends much earlier; but rounding could let it go round in circles."""
 
 
-@jitable
+@bitwise
 def maximize(graph, scratch, allowed, stream):  # type: ignore[no-untyped-def]
     """Writes the best joint action found into `scratch.best` and returns its payoff.
 

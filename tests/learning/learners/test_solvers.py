@@ -46,7 +46,14 @@ class Problem:
         graph = make_graph(self.n_agents, N_ACTIONS, self.edges, solver, rounds, eliminates)
         scratch = make_scratch(graph, N_ACTIONS)
         scratch.values[: self.payoffs.size] = self.payoffs.ravel()
+        plain, plain_stream = make_scratch(graph, N_ACTIONS), self.stream.copy()
+        plain.values[:] = scratch.values
         payoff = maximize(graph, scratch, self.allowed, self.stream)
+        # Compiled or not, the solvers do the same bit for bit.
+        assert payoff == maximize.py_func(graph, plain, self.allowed, plain_stream)
+        assert np.array_equal(scratch.best, plain.best)
+        assert np.array_equal(scratch.values, plain.values)
+        assert np.array_equal(self.stream, plain_stream)
         joint = tuple(scratch.best.tolist())
         assert joint in self.all_payoffs  # nothing vetoed
         assert payoff == pytest.approx(self.all_payoffs[joint], abs=1e-12)

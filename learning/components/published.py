@@ -33,11 +33,13 @@ class Table:
     Attributes:
         number: such as "8.2".
         data: what was classified, in words.
+        cycles: length of the log, in moves of each agent.
         agents: for each agent, the rows by id of the classifier.
     """
 
     number: str
     data: str
+    cycles: int
     agents: tuple[dict[str, Published], ...]
 
 
@@ -53,7 +55,7 @@ def read_table(task: str) -> Table | None:
                 }
                 for agent in table["agents"]
             )
-            return Table(table["table"], table["data"], agents)
+            return Table(table["table"], table["data"], table["cycles"], agents)
     return None
 
 

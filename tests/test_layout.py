@@ -42,7 +42,8 @@ FLOORS = {
     },
 }
 PUBLIC = {
-    *("hose_mj.compiled", "hose_mj.envs", "hose_mj.errors", "hose_mj.recording", "hose_mj.tasks"),
+    *("hose_mj.checks", "hose_mj.compiled", "hose_mj.envs", "hose_mj.errors"),
+    *("hose_mj.recording", "hose_mj.tasks"),
 }
 PACKAGES = ("hose_mj", "learning", "tools")
 HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy", "sklearn"}

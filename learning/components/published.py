@@ -16,8 +16,8 @@ class Published:
 
     Attributes:
         measures: by the names of `measures.MEASURES`, as fractions. The last column of Table 8.2b
-            is headed NPV and holds the positive predictive value (seven of its rows match what
-            sensitivity, specificity and the share of undesired moves give), so it is `ppv`.
+            is headed NPV but holds the positive predictive value, which its rows give within half
+            a per cent, so it is `ppv`.
         doubtful: accuracy does not lie between sensitivity and specificity, as it must: one of the
             three is misprinted.
     """
@@ -60,7 +60,7 @@ def read_table(task: str) -> Table | None:
 
 
 def _make_row(per_cent: dict[str, float]) -> Published:
-    measures = {name: value / 100.0 for name, value in per_cent.items()}
+    measures = {name: round(value / 100.0, 6) for name, value in per_cent.items()}
     ends = sorted((measures["sensitivity"], measures["specificity"]))
     is_between = ends[0] - MARGIN <= measures["accuracy"] <= ends[1] + MARGIN
     return Published(measures, not is_between)

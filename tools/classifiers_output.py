@@ -16,6 +16,7 @@ from hose_mj.recording.files import write_atomically
 from hose_mj.recording.parquet import write_records
 from hose_mj.recording.plot_bars import Bar, BarPanel, plot_bars
 from learning.components.classifiers import CLASSIFIERS
+from learning.components.cross_validation import Score, compute_score
 from learning.components.experience import write_experience
 from learning.components.measures import MEASURES
 from learning.components.offline import Result, Study
@@ -23,10 +24,11 @@ from tools.document import format_document
 
 HEADINGS = {
     "accuracy": "accuracy",
-    "sensitivity": "sensit.",
-    "specificity": "specif.",
+    "sensitivity": "sens.",
+    "specificity": "spec.",
     "npv": "NPV",
     "ppv": "PPV",
+    "over_logs": "over logs",
 }
 PLOTTED = {"accuracy": "accuracy", "specificity": "specificity: undesired moves found"}
 
@@ -36,6 +38,7 @@ def print_study(study: Study, checks: Sequence[Check]) -> None:
     console = Console()
     for agent in study.experience.agent_names:
         console.print(make_table(study, agent))
+    console.print("accuracy ± deviation over folds; over logs: accuracy ± deviation over logs")
     stand_ins = [f"{e.name}: {e.runs}" for e in CLASSIFIERS.values() if e.stands_in]
     console.print("* stand-ins. " + "; ".join(stand_ins) + ".")
     if study.table is not None:
@@ -46,10 +49,10 @@ def print_study(study: Study, checks: Sequence[Check]) -> None:
 
 def make_table(study: Study, agent: str) -> Table:
     """Returns the table of an agent: per cent, and the standard deviation over the folds."""
-    title = f"{study.plan.task}, {agent}: per cent, with the deviation over folds"
-    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
+    title = f"{study.plan.task}, {agent}: per cent"
+    table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("classifier", no_wrap=True)
-    for name in MEASURES:
+    for name in (*MEASURES, "over_logs"):
         table.add_column(HEADINGS[name], justify="right", no_wrap=True)
     for result in study.results:
         if result.agent != agent:
@@ -63,12 +66,22 @@ def make_table(study: Study, agent: str) -> Table:
 
 
 def format_scores(result: Result) -> list[str]:
-    """Returns the measures as "85.1 ±2.4", a dash where one does not exist."""
-    scores = (result.scores[name] for name in MEASURES)
-    return [
-        f"{100 * s.mean:.1f} ±{100 * s.deviation:.1f}" if math.isfinite(s.mean) else "-"
-        for s in scores
-    ]
+    """Returns the measures on the first log, then the accuracy over all logs."""
+    over_logs = compute_score(result.over_logs["accuracy"], 0.0)
+    rest = [format_mean(result.scores[name]) for name in MEASURES[1:]]
+    return [format_spread(result.scores[MEASURES[0]]), *rest, format_spread(over_logs)]
+
+
+def format_spread(score: Score) -> str:
+    """Returns "85.1 ± 2.4"; the mean alone where there is no deviation."""
+    if not math.isfinite(score.deviation):
+        return format_mean(score)
+    return f"{format_mean(score)} ± {100 * score.deviation:.1f}"
+
+
+def format_mean(score: Score) -> str:
+    """Returns "85.1", a dash where the measure does not exist."""
+    return f"{100 * score.mean:.1f}" if math.isfinite(score.mean) else "-"
 
 
 def format_published(result: Result) -> list[str]:
@@ -84,7 +97,9 @@ def make_check_table(checks: Sequence[Check]) -> Table:
         table.add_column(name, justify="left" if name in ("", "what") else "right")
     for check in checks:
         mark = "[green]ok[/]" if check.ok else "[red]failed[/]"
-        table.add_row(mark, check.name, f"{check.value:.3g}", f"{check.comparison} {check.limit:g}")
+        table.add_row(
+            mark, check.name, f"{check.value:.3g}", f"{check.comparison} {check.limit:.3g}"
+        )
     return table
 
 

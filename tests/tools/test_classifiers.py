@@ -46,6 +46,7 @@ def test_the_tables_and_a_failed_check(capsys, monkeypatch):
     shown = capsys.readouterr().out
     for text in ("taxi_0", "taxi_1", "C4.5 Tree*", "thesis ?", "Cobweb: Birch", "a claim"):
         assert text in shown
+    assert "…" not in shown
     assert "1 of 2 checks ok" in shown
     assert max(map(len, shown.splitlines())) <= 80
 

@@ -117,7 +117,7 @@ LEARNERS: dict[str, LearnerEntry] = {
         schedule="turns",
         section="8.2, Algorithms 8.1, 8.3",
         description="a classifier predicts what would break a constraint, and vetoes it",
-        refresh_moves=200,
+        refresh_moves=1000,
     ),
     "risk-q": LearnerEntry(
         file="risk_q",

@@ -30,7 +30,7 @@ from learning.learners.round_robin import add_rewards, finish, meet
 from learning.records import Learner, Memory
 from learning.settings import LearnerSettings, check_range, get_options
 
-OPTIONS = {"classifier": "tree", "minimum": 5, "capacity": 100}
+OPTIONS: dict[str, float | str] = {"classifier": "tree", "minimum": 5, "capacity": 100}
 """See `learning.components.usap.UndesiredPredictor`."""
 
 

@@ -26,9 +26,16 @@ class Command:
 
 COMMANDS = {
     "bench": Command("tools.bench", "measure speed beside peers that people know"),
+    "check-pcm": Command(
+        "tools.check_pcm", "check that one task is a partially constrained model of another"
+    ),
+    "check-sequential": Command(
+        "tools.check_sequential", "check that moves in turn are joint moves of one agent"
+    ),
     "compare": Command(
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
+    "consensus": Command("tools.consensus", "let agents agree on whose turn it is, by messages"),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
 }
 

@@ -1,0 +1,1 @@
+"""Parts of the thesis that stand beside the learners, each with a command of its own."""

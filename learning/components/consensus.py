@@ -120,12 +120,13 @@ class Record:
     @property
     def spreads(self) -> Floats:
         """Largest difference between two clocks (n_rounds,), in turns."""
-        return np.ptp(self.clocks, axis=1)
+        return np.asarray(np.ptp(self.clocks, axis=1), np.float64)
 
 
 def draw_rates(settings: ConsensusSettings, random: np.random.Generator) -> Floats:
     """Returns the rates v_i of the clocks (N,), 1 but for their drift."""
-    return 1.0 + random.uniform(-settings.drift, settings.drift, settings.n_agents)
+    drifts = random.uniform(-settings.drift, settings.drift, settings.n_agents)
+    return np.asarray(1.0 + drifts)
 
 
 def draw_messages(settings: ConsensusSettings, random: np.random.Generator) -> Messages:
@@ -153,7 +154,8 @@ def compute_clocks(history: Floats, messages: Messages, increments: Floats) -> F
     n_agents = len(clocks)
     told = history[messages.ages, np.arange(n_agents)]
     weights = messages.heard / n_agents
-    return clocks - (weights * (clocks[:, None] - told)).sum(axis=1) + increments
+    pulls = (weights * (clocks[:, None] - told)).sum(axis=1)
+    return np.asarray(clocks - pulls + increments)
 
 
 def compute_turns(clocks: Floats) -> Integers:

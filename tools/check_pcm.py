@@ -186,6 +186,4 @@ def _summarize(
         print(f"  source: {violation.source}\n  target: {violation.target}")
     if propositions is not None and propositions.shortfall > 0.0:
         state = written.target.model.names[propositions.shortfall_state]
-        print(
-            f"the transferred greedy policy is {propositions.shortfall:.4g} short of V_t* at {state}"
-        )
+        print(f"greedy on the transferred values is {propositions.shortfall:.4g} short at {state}")

@@ -23,11 +23,8 @@ def draw_values(title: str, propositions: Propositions) -> bytes:
             (propositions.bounds, "$\\max_a Q_s^*([s], a)$: never below", "o", 1),
             (propositions.greedy, "greedy on the transferred values: never above", "x", 0),
         ):
-            axes.plot(
-                *(best, values),
-                **{"ls": "", "marker": marker, "ms": 5.0, "mfc": "none", "label": name},
-                color=format_hex(OTHERS[place]),
-            )
+            color = format_hex(OTHERS[place])
+            axes.plot(best, values, ls="", marker=marker, ms=5.0, mfc="none", c=color, label=name)
         axes.set_xlabel("best value of a target state, $V_t^*(s)$")
         axes.set_ylabel("value")
         add_legend(figure, axes.get_legend_handles_labels()[0], columns=2)

@@ -115,7 +115,7 @@ class Record:
     @property
     def times(self) -> Floats:
         """The times of the rounds (n_rounds,)."""
-        return np.arange(len(self.clocks)) * self.round_time
+        return np.arange(len(self.clocks), dtype=np.float64) * self.round_time
 
     @property
     def spreads(self) -> Floats:
@@ -126,7 +126,7 @@ class Record:
 def draw_rates(settings: ConsensusSettings, random: np.random.Generator) -> Floats:
     """Returns the rates v_i of the clocks (N,), 1 but for their drift."""
     drifts = random.uniform(-settings.drift, settings.drift, settings.n_agents)
-    return np.asarray(1.0 + drifts)
+    return np.asarray(1.0 + drifts, np.float64)
 
 
 def draw_messages(settings: ConsensusSettings, random: np.random.Generator) -> Messages:
@@ -185,8 +185,9 @@ def run_clocks(settings: ConsensusSettings, random: np.random.Generator, n_round
 def simulate(settings: ConsensusSettings, random: np.random.Generator) -> Record:
     """Lets clocks agree and agents act by them, until the last turn is over for all.
 
-    A clock never falls below the turn that it has reached: without this the agent that gave its
-    turn away, ahead of all others, would be drawn back into it and act again.
+    A clock never falls below the turn that it has reached: without this the mean would draw the
+    agent that gave its turn away, ahead of all others, back into that turn, and the others would
+    gain only an N-th of the time that was saved.
     """
     n_agents, h = settings.n_agents, settings.round_time
     last_turn = settings.first_turn + settings.n_turns

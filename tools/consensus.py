@@ -47,6 +47,8 @@ class Args:
     """Longest action, in turns; durations are random up to it."""
     wait: bool = False
     """Let each turn run out instead of giving it to the next agent when the action is done."""
+    falls_back: bool = False
+    """Let clocks fall back below a turn that they have reached, as the thesis has it."""
     turns: int = 60
     """Turns to play."""
     out: Path = Path("out/consensus")
@@ -112,6 +114,7 @@ def make_settings(args: Args) -> ConsensusSettings:
         n_turns=args.turns,
         action_time=args.action_time,
         early_finish=not args.wait,
+        falls_back=args.falls_back,
     )
 
 

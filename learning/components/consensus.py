@@ -37,6 +37,8 @@ class ConsensusSettings:
         action_time: longest action, in turns; durations are uniform from 0 on.
         early_finish: whether an agent that is done gives the turn at once, xi_i <- t_i + 1, or lets
             it run out.
+        falls_back: whether the mean with others' clocks may take a clock back below a turn that it
+            has reached, as the thesis has it; see `simulate`.
 
     Raises:
         InputError: a value outside its range.
@@ -52,6 +54,7 @@ class ConsensusSettings:
     n_turns: int = 60
     action_time: float = 0.5
     early_finish: bool = True
+    falls_back: bool = False
 
     def __post_init__(self) -> None:
         for name, low, high in (("n_agents", 2, 20), ("delay", 0, 10), ("rounds", 1, 10**4)):
@@ -185,9 +188,9 @@ def run_clocks(settings: ConsensusSettings, random: np.random.Generator, n_round
 def simulate(settings: ConsensusSettings, random: np.random.Generator) -> Record:
     """Lets clocks agree and agents act by them, until the last turn is over for all.
 
-    A clock never falls below the turn that it has reached: without this the mean would draw the
-    agent that gave its turn away, ahead of all others, back into that turn, and the others would
-    gain only an N-th of the time that was saved.
+    With `falls_back` off, a clock never falls below the turn that it has reached. Otherwise the
+    mean draws the agent that gave its turn away, ahead of all others, back into that turn, and the
+    others gain only an N-th of the time that was saved.
     """
     n_agents, h = settings.n_agents, settings.round_time
     last_turn = settings.first_turn + settings.n_turns
@@ -204,7 +207,9 @@ def simulate(settings: ConsensusSettings, random: np.random.Generator) -> Record
         seen.append(clocks)
         turns = compute_turns(clocks)
         messages = draw_messages(settings, random)
-        following = np.maximum(compute_clocks(history, messages, rates * h), turns)
+        following = compute_clocks(history, messages, rates * h)
+        if not settings.falls_back:
+            following = np.maximum(following, turns)
         for agent in range(n_agents):
             turn = int(turns[agent])
             own = find_owner(turn, n_agents) == agent and settings.first_turn <= turn < last_turn

@@ -109,12 +109,33 @@ def test_an_action_within_the_bound_never_meets_another_and_a_longer_one_does():
     assert count_overlaps(stretch(1.1 * np.diff(begins).max())) == settings.n_turns - 1
 
 
-def test_giving_the_turn_at_once_saves_time():
+def test_giving_the_turn_at_once_saves_time_unless_the_mean_takes_it_back():
     ends = []
-    for early_finish in (True, False):
-        settings = ConsensusSettings(early_finish=early_finish)
-        ends.append(simulate(settings, np.random.default_rng(1)).times[-1])
-    assert ends[0] < 0.6 * ends[1]
+    for changed in ({}, {"falls_back": True}, {"early_finish": False}):
+        settings = ConsensusSettings(delay=0, **changed)
+        record = simulate(settings, np.random.default_rng(1))
+        assert count_disorder(record.actions, settings) == count_overlaps(record.actions) == 0
+        ends.append(record.times[-1])
+    assert ends[0] < 0.7 * ends[1]
+    assert ends[1] < 0.95 * ends[2]
+
+
+def test_a_given_turn_is_kept_or_lost_by_the_mean():
+    # Two agents, equal clocks, actions of no length: agent 0 gives turn 2 in the round it begins.
+    settings = {"n_agents": 2, "loss": 0.0, "delay": 0, "drift": 0.0, "offset": 0.0, "rounds": 10}
+    clocks = []
+    for falls_back in (False, True):
+        made = ConsensusSettings(
+            **settings, action_time=0.0, first_turn=2, n_turns=1, falls_back=falls_back
+        )
+        record = simulate(made, np.random.default_rng(0))
+        begun = round(record.actions[0].begin * 10)
+        clocks.append(record.clocks[begun + 1 : begun + 3])
+    for (given, waiting), _ in clocks:
+        assert (given, waiting) == (3.0, pytest.approx(2.1, abs=1e-9))
+    mean = (3.0 + 2.1) / 2 + 0.1
+    assert clocks[0][1] == pytest.approx([3.0, mean])
+    assert clocks[1][1] == pytest.approx([mean, mean])
 
 
 def test_the_counts_see_what_is_wrong():

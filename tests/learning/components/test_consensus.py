@@ -6,6 +6,7 @@ from learning.components.consensus import (
     Action,
     ConsensusSettings,
     Messages,
+    Record,
     compute_clocks,
     compute_leads,
     compute_longest_action,
@@ -107,6 +108,15 @@ def test_an_action_within_the_bound_never_meets_another_and_a_longer_one_does():
 
     assert count_overlaps(stretch(longest)) == 0
     assert count_overlaps(stretch(1.1 * np.diff(begins).max())) == settings.n_turns - 1
+
+
+def test_leads_remember_the_furthest_clock():
+    clocks = np.array([[1.0, 1.5], [1.9, 2.3], [2.0, 2.1], [2.4, 2.4], [3.1, 3.0]])
+    actions = (Action(2, 0, 0.2, 0.3), Action(3, 1, 0.4, 0.5))
+    record = Record(np.ones(2), clocks, actions, 0.1)
+    assert compute_leads(record) == pytest.approx([0.3, 0.1])
+    assert compute_longest_action(0.3, 0.0) == pytest.approx(0.7)
+    assert compute_longest_action(0.3, 0.4) == pytest.approx(0.5)
 
 
 def test_giving_the_turn_at_once_saves_time_unless_the_mean_takes_it_back():

@@ -122,14 +122,14 @@ def run_trial(settings: ConsensusSettings, seed: int) -> Trial:
     """Simulates one loss, twice: clocks alone, and agents that act by them."""
     import numpy as np
 
-    from learning.components import consensus, consensus_moments
+    from learning.components import consensus, consensus_measures, consensus_moments
 
     alone, playing = np.random.default_rng(seed).spawn(2)
     settling = SETTLING_TURNS * settings.rounds
     n_rounds = settling + MEASURED_TURNS * settings.rounds
     clocks = consensus.run_clocks(settings, alone, n_rounds)
     play = consensus.simulate(settings, playing)
-    leads = consensus.compute_leads(play)
+    leads = consensus_measures.compute_leads(play)
     reached = (play.clocks.max(axis=1) >= settings.first_turn).argmax()
     turns_taken = play.times[-1] - play.times[reached]
     record = {
@@ -139,9 +139,11 @@ def run_trial(settings: ConsensusSettings, seed: int) -> Trial:
         "disagreement": float(np.sqrt(clocks.clocks[settling:].var(axis=1).mean())),
         "exact_disagreement": consensus_moments.compute_disagreement(settings, clocks.rates),
         "actions": len(play.actions),
-        "disorder": consensus.count_disorder(play.actions, settings),
-        "overlaps": consensus.count_overlaps(play.actions),
-        "longest_safe_action": consensus.compute_longest_action(float(leads.max()), settings.drift),
+        "disorder": consensus_measures.count_disorder(play.actions, settings),
+        "overlaps": consensus_measures.count_overlaps(play.actions),
+        "longest_safe_action": consensus_measures.compute_longest_action(
+            float(leads.max()), settings.drift
+        ),
         "turns_per_time": settings.n_turns / float(turns_taken),
     }
     return Trial(settings, clocks, play, record)

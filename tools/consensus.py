@@ -130,8 +130,9 @@ def run_trial(settings: ConsensusSettings, seed: int) -> Trial:
     clocks = consensus.run_clocks(settings, alone, n_rounds)
     play = consensus.simulate(settings, playing)
     leads = consensus_measures.compute_leads(play)
+    lead = float(leads.max()) if len(leads) else 1.0  # clocks so coarse that they skip all turns
     reached = (play.clocks.max(axis=1) >= settings.first_turn).argmax()
-    turns_taken = play.times[-1] - play.times[reached]
+    duration = (len(play.times) - reached) * settings.round_time  # the last round is over too
     record = {
         "loss": settings.loss,
         "first_spread": float(play.spreads[0]),
@@ -141,10 +142,8 @@ def run_trial(settings: ConsensusSettings, seed: int) -> Trial:
         "actions": len(play.actions),
         "disorder": consensus_measures.count_disorder(play.actions, settings),
         "overlaps": consensus_measures.count_overlaps(play.actions),
-        "longest_safe_action": consensus_measures.compute_longest_action(
-            float(leads.max()), settings.drift
-        ),
-        "turns_per_time": settings.n_turns / float(turns_taken),
+        "longest_safe_action": consensus_measures.compute_longest_action(lead, settings.drift),
+        "turns_per_time": settings.n_turns / float(duration),
     }
     return Trial(settings, clocks, play, record)
 

@@ -30,6 +30,13 @@ def test_actions_as_long_as_a_turn_fail_their_checks(capsys, tmp_path):
     assert "50%" in out
 
 
+def test_clocks_that_skip_turns_fail_their_checks(capsys, tmp_path):
+    coarse = ["--rounds", "1", "--turns", "1", "--drift", "0.5", "--delay", "10"]
+    assert cli.main(["consensus", *coarse, "--out", str(tmp_path), "--json"]) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert 0 in [record["actions"] for record in document["records"]]
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from hose_mj.errors import InputError
+from tools.check_table import print_checks
 from tools.document import make_document, print_document
 
 if TYPE_CHECKING:
@@ -70,13 +71,4 @@ def _summarize(bench: Bench) -> None:
         ratio = "" if record.ratio is None else f"{record.ratio:,.3g}"
         table.add_row(record.name, f"{record.value:,.4g}", record.unit, ratio, record.peer or "")
     console.print(table)
-    if not bench.checks:
-        return
-    table = Table(title="Checks")
-    for name in ("", "what", "value", "limit"):
-        table.add_column(name, justify="left" if name in ("", "what") else "right")
-    for check in bench.checks:
-        mark = "[green]ok[/]" if check.ok else "[red]failed[/]"
-        limit = f"{check.comparison} {check.limit:,.4g}"
-        table.add_row(mark, check.name, f"{check.value:,.4g}", limit)
-    console.print(table)
+    print_checks(bench.checks)

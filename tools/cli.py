@@ -26,12 +26,19 @@ class Command:
 
 COMMANDS = {
     "bench": Command("tools.bench", "measure speed beside peers that people know"),
+    "check-pcm": Command(
+        "tools.check_pcm", "check that one task is a partially constrained model of another"
+    ),
+    "check-sequential": Command(
+        "tools.check_sequential", "check that moves in turn are joint moves of one agent"
+    ),
     "classifiers": Command(
         "tools.classifiers", "measure which classifiers predict undesired moves (chapter 8)"
     ),
     "compare": Command(
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
+    "consensus": Command("tools.consensus", "let agents agree on whose turn it is, by messages"),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
     "reproduce": Command(
         "tools.reproduce", "repeat the thesis's experiments over seeds, beside its numbers"

@@ -23,8 +23,8 @@ from learning.study.run_folder import RunFolder
 from learning.study.statistics import compute_rate_interval
 from learning.study.training import Episodes, Training, join
 from tools.document import make_document, print_document
-from tools.options import parse_options
 from tools.progress import show_progress
+from tools.task_options import parse_options
 
 DEFAULT_EPISODES = {"line": 100_000, "line-non-cooperative": 100_000, "line-2015": 20_000}
 """Where the default of 2,000 episodes is too few."""

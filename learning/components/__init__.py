@@ -1,1 +1,1 @@
-"""What learners are made of beside tables and rules; each part has a command of its own."""
+"""Parts of the thesis that stand beside the learners, each with a command of its own."""

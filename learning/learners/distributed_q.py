@@ -19,7 +19,7 @@ from learning import rules
 from learning.learner import make_learner
 from learning.learners.joint import (
     choose_each,
-    find_highest_action,
+    find_highest_value,
     find_next_value,
     get_last_value,
     set_last_value,
@@ -94,7 +94,7 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
             following = find_next_value(memory, agent, module, is_over)
             td_target = memory.rewards[agent, module] + rule.discount * following
             if td_target > get_last_value(memory, agent, module, action):
-                highest = find_highest_action(memory, memory.last_keys[agent, module])
+                highest = find_highest_value(memory, memory.last_keys[agent, module])
                 set_last_value(memory, agent, module, action, td_target)
                 if rule.keeps_policy and td_target > highest:
                     kept = memory.scores.shape[0]

@@ -50,7 +50,7 @@ def set_last_value(memory, agent, module, action, value):  # type: ignore[no-unt
 
 
 @jitable
-def find_highest_action(memory, key):  # type: ignore[no-untyped-def]
+def find_highest_value(memory, key):  # type: ignore[no-untyped-def]
     """Returns max_a Q(s, a), where `memory.scores` says how many actions there are."""
     row = find(memory.table, key)
     highest = memory.table.rows[row, 0]
@@ -64,7 +64,7 @@ def find_next_value(memory, agent, module, is_over):  # type: ignore[no-untyped-
     """Returns max_a' Q(s', a') of the state after the joint move; 0 if the episode is over."""
     if is_over:
         return 0.0
-    return find_highest_action(memory, memory.keys[agent, module])
+    return find_highest_value(memory, memory.keys[agent, module])
 
 
 @jitable

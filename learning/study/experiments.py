@@ -167,7 +167,7 @@ N_CONFIGURATIONS = 30
 _TEAMS: dict[str, tuple[str, dict[str, Any]]] = {
     "d-rr-ql": ("d-rr-ql", {"learning_rate": 0.25}),
     "d-ql": ("d-ql", {}),
-    "d-ql with vetoes": ("d-ql", {"vetoes": "modules"}),
+    "d-ql, kept policy": ("d-ql", {"options": {"keeps_policy": "yes"}}),
 }
 
 

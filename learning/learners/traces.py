@@ -19,7 +19,7 @@ from learning.learners.round_robin import add_rewards, get_learning_rate
 from learning.mediators import find_highest
 from learning.records import Learner, Memory
 from learning.settings import LearnerSettings, check_range, get_options
-from learning.tables import claim, find
+from learning.tables import FIRST_CAPACITY, claim, find
 
 OPTIONS = {"trace_decay": 0.9, "n_kept": 50}
 """lambda, and how many moves of an agent are remembered."""
@@ -63,9 +63,12 @@ def make(
     """
     options = get_options(settings, OPTIONS)
     check_range("trace_decay", options["trace_decay"], 0.0, 1.0)
-    check_range("n_kept", options["n_kept"], 1, 10_000)
-    n_agents, n_kept = task.n_agents, int(options["n_kept"])
+    n_agents = task.n_agents
     n_values = sum(module.kind == "value" for module in settings.modules)
+    # One move may write the whole trail of every agent, into the free half of a hashed table.
+    most = FIRST_CAPACITY // 2 // (n_agents * n_values)
+    check_range("n_kept", options["n_kept"], 1, most)
+    n_kept = int(options["n_kept"])
     own = Trail(
         keys=np.zeros((n_agents, n_kept, n_values), np.int64),
         actions=np.zeros((n_agents, n_kept), np.int64),

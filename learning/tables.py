@@ -95,6 +95,20 @@ def count_free(table):  # type: ignore[no-untyped-def]
     return table.keys.shape[0] // 2 - table.used[0]
 
 
+def is_sound(table: Table) -> bool:
+    """Whether the parts of a table fit together, as those of one read from a file may not."""
+    capacity = len(table.keys)
+    if capacity == 0:
+        return True
+    n_keys = np.count_nonzero(table.keys)
+    return (
+        capacity & (capacity - 1) == 0
+        and len(table.rows) == capacity + 1
+        and table.used.tolist() == [n_keys]
+        and n_keys < capacity
+    )
+
+
 def grow(table: Table) -> Table:
     """Returns a hashed table of twice the capacity with the same rows."""
     capacity = 2 * len(table.keys)

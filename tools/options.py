@@ -26,7 +26,7 @@ def parse_options(words: Sequence[str]) -> dict[str, Any]:
             raise InputError("option", word, f"{name} only once")
         try:
             value = ast.literal_eval(text)
-        except (ValueError, SyntaxError):
+        except (ValueError, TypeError, SyntaxError):
             value = text
         options[name] = tuple(value) if isinstance(value, list) else value
     return options

@@ -100,13 +100,9 @@ def is_sound(table: Table) -> bool:
     capacity = len(table.keys)
     if capacity == 0:
         return True
-    n_keys = np.count_nonzero(table.keys)
-    return (
-        capacity & (capacity - 1) == 0
-        and len(table.rows) == capacity + 1
-        and table.used.tolist() == [n_keys]
-        and n_keys < capacity
-    )
+    n_keys = int(np.count_nonzero(table.keys))
+    fits = capacity & (capacity - 1) == 0 and len(table.rows) == capacity + 1
+    return fits and int(table.used[0]) == n_keys < capacity
 
 
 def grow(table: Table) -> Table:

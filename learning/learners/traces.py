@@ -81,41 +81,37 @@ def make(
 
 
 @jitable
-def is_same(trail, agent, one, other):  # type: ignore[no-untyped-def]
-    """Whether two remembered moves are the same action in what looks like the same state."""
-    same = trail.actions[agent, one] == trail.actions[agent, other]
+def is_last(memory, agent, place):  # type: ignore[no-untyped-def]
+    """Whether a remembered move is the agent's last action in what looks like the same state."""
+    trail = memory.own
+    same = trail.actions[agent, place] == memory.actions[agent]
     for module in range(trail.keys.shape[2]):
-        same &= trail.keys[agent, one, module] == trail.keys[agent, other, module]
+        same &= trail.keys[agent, place, module] == memory.last_keys[agent, module]
     return same
 
 
 @jitable
-def copy_move(trail, agent, source, target):  # type: ignore[no-untyped-def]
-    """Copies a remembered move to another place."""
-    trail.actions[agent, target] = trail.actions[agent, source]
-    trail.ages[agent, target] = trail.ages[agent, source]
-    for module in range(trail.keys.shape[2]):
-        trail.keys[agent, target, module] = trail.keys[agent, source, module]
-
-
-@jitable
 def remember(memory, agent):  # type: ignore[no-untyped-def]
-    """Puts the agent's last move first; an earlier one like it is replaced."""
+    """Puts the agent's last move first; it replaces an earlier one like it, or the oldest."""
     trail = memory.own
-    length = min(trail.lengths[agent] + 1, trail.ages.shape[1])
-    for place in range(length - 1, 0, -1):
-        copy_move(trail, agent, place - 1, place)
+    length = trail.lengths[agent]
+    free = 0
+    while free < length and not is_last(memory, agent, free):
+        free += 1
+    if free == length:
+        length = min(length + 1, trail.ages.shape[1])
+        free = length - 1
+    for place in range(length):
         trail.ages[agent, place] += 1
+    for place in range(free, 0, -1):
+        trail.actions[agent, place] = trail.actions[agent, place - 1]
+        trail.ages[agent, place] = trail.ages[agent, place - 1]
+        for module in range(trail.keys.shape[2]):
+            trail.keys[agent, place, module] = trail.keys[agent, place - 1, module]
     trail.actions[agent, 0] = memory.actions[agent]
     trail.ages[agent, 0] = 0
     for module in range(trail.keys.shape[2]):
         trail.keys[agent, 0, module] = memory.last_keys[agent, module]
-    for place in range(1, length):
-        if is_same(trail, agent, place, 0):
-            for later in range(place, length - 1):
-                copy_move(trail, agent, later + 1, later)
-            length -= 1
-            break
     trail.lengths[agent] = length
 
 

@@ -41,7 +41,7 @@ def apply_chain(record, state, agent, action):
     cell = state[HEADER] + record.moves[action]
     kernels.end_turn(record, state, agent)
     state[HEADER] = min(max(cell, 0), record.n_cells - 1)
-    return int(cell == record.n_cells - 1) | 2 * int(record.cliff and cell == 0)
+    return int(cell >= record.n_cells - 1) | 2 * int(record.cliff and cell <= 0)
 
 
 @kernels.observe.register(Chain)

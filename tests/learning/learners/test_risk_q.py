@@ -17,7 +17,7 @@ def test_the_risk_is_the_probability_of_a_fall(
     make_chain, make_training, read_values, solve_cycle
 ):
     """Beside a teammate that walks by chance even the safest steps may end in a fall."""
-    task = make_chain(n_cells=6, start=2, cliff=True)
+    task = make_chain(moves=(-2, 1), n_cells=7, start=3, cliff=True)
     training = make_training(
         task, "risk-q", options={"settle_episodes": 10**9}, learning_rate_decay=2e-3
     )
@@ -31,8 +31,8 @@ def test_the_risk_is_the_probability_of_a_fall(
         return risks.min(axis=1)
 
     mine, expected = solve_cycle(model, 0, (1.0, 1.0, 1.0), uniform, falls, choose=choose)
-    assert learned[mine] == pytest.approx(expected, abs=0.02)
-    assert 0.05 < expected.min(axis=1).max() < 1.0
+    assert learned[mine] == pytest.approx(expected, abs=0.06)
+    assert ((expected > 0.2) & (expected < 0.8)).any(axis=1).all()
     # The goal's values are those of the same policy, for which the discounts are gamma^k.
     safest = np.zeros(len(model.states), np.int64)
     safest[mine] = expected.argmin(axis=1)

@@ -59,7 +59,7 @@ def remake(description: Mapping[str, Any]) -> Training:
     try:
         task = make_task(description["task"], **_freeze(description["task_options"]))
         settings = read_settings(description["learner_settings"])
-        generator = np.random.default_rng(description["seed"])
+        generator = np.random.default_rng(int(description["seed"]))
         return Training(task, description["learner"], settings, generator)
     except InputError:
         raise
@@ -171,7 +171,7 @@ def load_memory(path: Path, like: Memory) -> Memory:
         grows = name.startswith(("table.", "vetoes.")) and len(wanted[name.split(".")[0] + ".keys"])
         found, dims = arrays[name], slice(1 if grows else 0, None)
         fits = found.dtype == array.dtype and found.ndim == array.ndim
-        if not fits or found.shape[dims] != array.shape[dims]:
+        if not fits or found.shape[dims] != array.shape[dims] or (grows and len(found) == 0):
             shape = f"{array.dtype}{array.shape}"
             raise InputError("checkpoint", str(path), f"one where {name} is {shape}")
     memory: Memory = unflatten(like, arrays)

@@ -1,5 +1,6 @@
 """What the tests of learners share: small tasks, trainings on them, and what their tables say."""
 
+import importlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from hose_mj.tasks.kernels import HEADER
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.task import Task, make_reward_table
 from hose_mj.tasks.variables import Variable
-from learning import loop
+from learning import loop, tables
 from learning.evaluation import make_probe
 from learning.learners import catalog
 from learning.settings import Exploration
@@ -92,6 +93,13 @@ def make_training():
         return Training(task, id, made, np.random.default_rng(seed), compiled)
 
     return make
+
+
+@pytest.fixture
+def shrink_tables(monkeypatch):
+    """Lets hashed tables begin small; rules that ask for their size are to know the real one."""
+    importlib.import_module("learning.learners.traces")
+    return lambda capacity: monkeypatch.setattr(tables, "FIRST_CAPACITY", capacity)
 
 
 @pytest.fixture

@@ -94,12 +94,12 @@ def test_events_and_actions_as_bits(make_line):
     ],
 )
 def test_wrong_names(make_line, module, message):
+    def make():
+        modules = (Module(name="goal", variables=()), Module(name="one", **module))
+        make_learner(make_line(), LearnerSettings(modules=modules), None, np.random.default_rng(1))
+
     with pytest.raises(InputError, match=message):
-        one = Module(name="one", **module)
-        modules = (Module(name="goal", variables=()), one)
-        make_learner(
-            make_line(), LearnerSettings(modules=modules), None, np.random.default_rng(1)
-        )
+        make()
 
 
 def test_more_states_than_numbers():

@@ -9,7 +9,9 @@ from learning import tables
 from learning.tables import Table, claim, count_free, find, grow, is_sound, make_table
 
 LARGEST = 2**62
-keys = st.one_of(st.integers(0, 7), st.integers(0, LARGEST - 1), st.integers(0, 40).map(lambda k: k << 52))
+keys = st.one_of(
+    st.integers(0, 7), st.integers(0, LARGEST - 1), st.integers(0, 40).map(lambda k: k << 52)
+)
 writes = st.lists(st.tuples(keys, st.integers(-5, 5)), max_size=60)
 
 

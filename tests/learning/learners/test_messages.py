@@ -11,7 +11,13 @@ def test_6_2_equals_6_1_at_every_move(make_training, make_line, name, vetoes):
     task = make_task("corridor", step_limit=9) if name == "corridor" else make_line()
     central, distributed = (
         make_training(
-            task, id, seed=5, epsilon=0.4, vetoes=vetoes, learning_rate=0.3, learning_rate_decay=0.01
+            task,
+            id,
+            seed=5,
+            epsilon=0.4,
+            vetoes=vetoes,
+            learning_rate=0.3,
+            learning_rate_decay=0.01,
         )
         for id in ("rr-q", "d-rr-ql-messages")
     )

@@ -13,9 +13,7 @@ def write_out(task):
     return enumerate_turns(task, [task.reset(np.array([3], np.uint64))])
 
 
-def test_the_risk_is_the_probability_of_a_fall(
-    make_chain, make_training, read_values, solve_cycle
-):
+def test_the_risk_is_the_probability_of_a_fall(make_chain, make_training, read_values, solve_cycle):
     """Beside a teammate that walks by chance even the safest steps may end in a fall."""
     task = make_chain(moves=(-2, 1), n_cells=7, start=3, cliff=True)
     training = make_training(

@@ -80,9 +80,7 @@ def test_a_cycle_that_is_cut_off_teaches_nothing(make_training, step_limit, firs
 def test_the_rate_falls_with_the_moves(make_chain, make_training):
     # One agent, one step: the n-th move is worth alpha_n (100 - Q) more.
     task = make_chain(n_agents=1, moves=(1,), n_cells=2)
-    training = make_training(
-        task, "q-learning", learning_rate=0.5, learning_rate_decay=0.25
-    )
+    training = make_training(task, "q-learning", learning_rate=0.5, learning_rate_decay=0.25)
     expected = 0.0
     for n in range(1, 9):
         training.advance(moves=1)

@@ -71,9 +71,7 @@ def test_the_first_success_by_hand(make_chain, make_training):
     """
     task = make_chain(moves=(1,))
     options = {"trace_decay": LAMBDA}
-    training = make_training(
-        task, "d-rr-ql-traces", **PLAIN, learning_rate=ALPHA, options=options
-    )
+    training = make_training(task, "d-rr-ql-traces", **PLAIN, learning_rate=ALPHA, options=options)
     training.advance(episodes=1)
     first, second = training.memory.table.rows[:12, 0].reshape(2, 6)
     share = GAMMA**2 * LAMBDA
@@ -85,9 +83,7 @@ def test_the_first_success_by_hand(make_chain, make_training):
 def test_only_the_last_moves_are_kept(make_chain, make_training):
     task = make_chain(moves=(1,))
     options = {"trace_decay": LAMBDA, "n_kept": 2}
-    training = make_training(
-        task, "d-rr-ql-traces", **PLAIN, learning_rate=ALPHA, options=options
-    )
+    training = make_training(task, "d-rr-ql-traces", **PLAIN, learning_rate=ALPHA, options=options)
     training.advance(episodes=1)
     first = training.memory.table.rows[:6, 0]
     assert first == pytest.approx([0, 0, 50 * GAMMA**2 * LAMBDA, 0, 50, 0])
@@ -120,7 +116,9 @@ def test_a_trail_is_the_list_of_different_moves_the_latest_first(moves, n_kept):
         expected = [(key, action, time), *(m for m in expected if m[:2] != (key, action))]
         expected = expected[:n_kept]
         n = trail.lengths[0]
-        found = zip(trail.keys[0, :n, 0], trail.actions[0, :n], time - trail.ages[0, :n], strict=True)
+        found = zip(
+            trail.keys[0, :n, 0], trail.actions[0, :n], time - trail.ages[0, :n], strict=True
+        )
         assert list(found) == expected
 
 

@@ -21,11 +21,16 @@ SEED = 11
 
 
 def make(id, name, **settings):
-    """Makes an uncompiled training."""
+    """Makes an uncompiled training; a joint learner may refuse to be alone."""
     task = make_task(name, **TASKS[name])
     settings.setdefault("exploration", Exploration(epsilon=0.6, per_episode=1e-3))
     made = make_settings(id, task, **settings)
-    return Training(task, id, made, np.random.default_rng(SEED), compiled=False)
+    try:
+        return Training(task, id, made, np.random.default_rng(SEED), compiled=False)
+    except InputError as error:
+        if LEARNERS[id].schedule == "turns" or task.n_agents > 1:
+            raise
+        pytest.skip(str(error))
 
 
 def check_same(one, other):
@@ -52,7 +57,7 @@ def test_same_seed_same_result_saved_or_not(pair, tmp_path):
     check_same(again, stopped)
     again.advance(moves=once.moves - again.moves)
     check_same(once, again)
-    assert once.memory.table.rows.any()
+    assert once.memory.table.rows.any() or once.memory.vetoes.rows.any()
 
 
 def test_it_counts_tests_and_ends(pair):
@@ -61,7 +66,7 @@ def test_it_counts_tests_and_ends(pair):
     ended = training.advance(moves=400)
     assert 400 <= training.moves < 400 + task.n_agents
     assert len(ended) == training.episodes > 0
-    assert 0 < ended.moves.min()
+    assert ended.moves.min() > 0
     assert ended.moves.max() <= task.step_limit
     assert np.isfinite(training.memory.table.rows).all()
     before = {name: array.copy() for name, array in flatten(training.memory).items()}
@@ -72,12 +77,16 @@ def test_it_counts_tests_and_ends(pair):
         assert array.tobytes() == before[name].tobytes(), name
 
 
-# What each learner's greedy policy manages after this many moves, seldom or never without learning.
+# Not a careful learner's defaults: the goal is to count soon.
+BOLD = {"risk-q": {"settle_episodes": 0, "xi_step": 1.0, "xi_most": 1e6}}
+
+
 @pytest.mark.parametrize("id", LEARNERS)
 def test_it_learns_the_maze(id):
     """Every start is at most six steps from the goal; by chance it takes twenty."""
     falls = Exploration(per_episode=0.02)
-    training = make(id, "maze", exploration=falls, vetoes="none", values="monolithic")
+    settings = {"vetoes": "none", "values": "monolithic", "options": BOLD.get(id, {})}
+    training = make(id, "maze", exploration=falls, **settings)
     training.advance(episodes=150)
     tests = training.test(30)
     assert tests.find_successes(training.task).all()

@@ -1,5 +1,7 @@
 """The loops: compiled or not, dense or hashed, in chunks or whole: the same learning."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -108,13 +110,19 @@ def test_other_seeds_differ(make_training):
     assert (trainings[0].memory.table.rows != trainings[1].memory.table.rows).any()
 
 
+def list_neighbours(width):
+    """All ordered pairs of neighbouring cells of a square."""
+    cells = list(product(range(width), repeat=2))
+    return [(a, b) for a in cells for b in cells if abs(a[0] - b[0]) + abs(a[1] - b[1]) == 1]
+
+
 @pytest.mark.parametrize("name", ["line", "taxi"])
 def test_after_exhaustive_exploration_vetoes_are_the_constraints(make_training, make_line, name):
     """No unsafe move is allowed any more, and no safe one is vetoed, in any state."""
     tasks = [make_line(goal="none")]
-    if name == "taxi":  # each of them in a dead end: what they see there they hardly meet by chance
-        cells, rest = ((4, 0), (3, 0)), {"passengers": (("R", "G"),), "step_limit": 300}
-        tasks = [make_task("taxi", starts=starts, **rest) for starts in (cells, cells[::-1])]
+    if name == "taxi":  # side by side in every place: by chance they would seldom meet
+        rest = {"passengers": (("R", "G"),), "step_limit": 6}
+        tasks = [make_task("taxi", starts=starts, **rest) for starts in list_neighbours(5)]
     training = make_training(tasks[0], "safe-msav", epsilon=1.0)
     for task in tasks:
         training.task = task

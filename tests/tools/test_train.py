@@ -161,7 +161,7 @@ def test_the_list_names_every_task_and_learner(call):
 
 def test_options_reach_task_and_learner(call, tmp_path):
     words = ("--set", "n_cells=4", "starts=(0,3)", "--options", "trace_decay=0.5", "n_kept=3")
-    status, document, _ = call(
+    status, *_ = call(
         *("train", "corridor", "--learner", "d-rr-ql-traces", "--episodes", 20, "--tests", 2),
         *(*words, "--learning-rate", 0.5, "--discount", 0.8, "--vetoes", "none"),
         *("--epsilon", 0.7, "--epsilon-per-success", 0.01, "--out", tmp_path, "--json"),
@@ -183,13 +183,14 @@ def test_options_reach_task_and_learner(call, tmp_path):
     ("task", "words", "expected"),
     [
         ("maze", (), Exploration(per_episode=2.0 / 2000)),
-        ("maze", ("--episodes", "10", "--epsilon", "0.5"), Exploration(epsilon=0.5, per_episode=0.1)),
+        ("maze", ("--episodes", "10"), Exploration(per_episode=0.2)),
+        ("maze", ("--epsilon", "0.5"), Exploration(epsilon=0.5, per_episode=1.0 / 2000)),
         ("maze", ("--episodes", "1"), Exploration(per_episode=1.0)),
         ("line", (), Exploration(epsilon=0.3)),
         ("line", ("--set", "goal=(2,1)"), Exploration(per_episode=2.0 / 100_000)),
         ("line", ("--epsilon-per-episode", "0.25"), Exploration(per_episode=0.25)),
     ],
-)  # fmt: skip
+)
 def test_epsilon_by_default(task, words, expected):
     args = cli.parse_arguments("train", train.Args, [task, *words])
     made = train.make_task(task, **parse_options(args.set))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -36,6 +36,9 @@ class Module:
             the mover for its "own" action alone.
         threshold: a value module vetoes actions whose values lie below it; None vetoes nothing.
         actions: the actions that a veto module is about; by default all of them.
+
+    Raises:
+        InputError: an unknown kind or credit.
     """
 
     name: str
@@ -46,6 +49,12 @@ class Module:
     credit: Credit = "cycle"
     threshold: float | None = None
     actions: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, choices in (("kind", get_args(Kind)), ("credit", get_args(Credit))):
+            if getattr(self, name) not in choices:
+                valid = "one of " + ", ".join(choices)
+                raise InputError(f"{name} of module {self.name}", getattr(self, name), valid)
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,16 @@ def count_free(table):  # type: ignore[no-untyped-def]
     return table.keys.shape[0] // 2 - table.used[0]
 
 
+def is_sound(table: Table) -> bool:
+    """Whether the parts of a table fit together, as those of one read from a file may not."""
+    capacity = len(table.keys)
+    if capacity == 0:
+        return True
+    n_keys = int(np.count_nonzero(table.keys))
+    fits = capacity & (capacity - 1) == 0 and len(table.rows) == capacity + 1
+    return fits and int(table.used[0]) == n_keys < capacity
+
+
 def grow(table: Table) -> Table:
     """Returns a hashed table of twice the capacity with the same rows."""
     capacity = 2 * len(table.keys)

@@ -42,6 +42,7 @@ def parse_options(words: Iterable[str]) -> dict[str, Any]:
 
 def _read_value(text: str) -> Any:
     try:
-        return ast.literal_eval(text)
-    except (SyntaxError, ValueError):
+        value = ast.literal_eval(text)
+    except (ValueError, TypeError, SyntaxError):
         return text
+    return tuple(value) if isinstance(value, list) else value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,7 +23,7 @@ from learning.study.run_folder import RunFolder
 from learning.study.statistics import compute_rate_interval
 from learning.study.training import Episodes, Training, join
 from tools.document import make_document, print_document
-from tools.progress import show_progress
+from tools.progress import defer_interrupt, show_progress
 from tools.task_options import parse_options
 
 DEFAULT_EPISODES = {"line": 100_000, "line-non-cooperative": 100_000, "line-2015": 20_000}
@@ -50,7 +50,8 @@ class Args:
     options: tuple[str, ...] = ()
     """Options of the learner's own, as trace_decay=0.8."""
     episodes: int | None = None
-    """Episodes to train for, counted from the start of the run; the default depends on the task."""
+    """Episodes to train for, counted from the start of the run; the default depends on the task, or
+    with --resume on what the run was to end after."""
     moves: int | None = None
     """Moves of single agents after which training ends, if that comes first."""
     epsilon: float | None = None
@@ -85,11 +86,10 @@ def run(args: Args) -> int:
         _list()
         return 0
     _check(args)
-    folder, training, seed = _resume(args) if args.resume else _begin(args)
+    folder, training, seed, args = _resume(args) if args.resume else _begin(args)
     before = training.moves
     begun = time.perf_counter()
     with compile_notice("learner's kernels"):
-        training.advance(moves=0)
         _compile(training)
     compiled = time.perf_counter()
     ended = _train(training, folder, args)
@@ -118,7 +118,7 @@ def _check(args: Args) -> None:
             raise InputError(name, getattr(args, name), "one of " + ", ".join(choices))
 
 
-def _begin(args: Args) -> tuple[RunFolder, Training, int]:
+def _begin(args: Args) -> tuple[RunFolder, Training, int, Args]:
     task = make_task(args.task, **parse_options(args.set))
     id = args.learner or ("thresholded-msav" if args.task.startswith("line") else "d-rr-ql")
     catalog.find_learner(id)
@@ -128,8 +128,9 @@ def _begin(args: Args) -> tuple[RunFolder, Training, int]:
     training = Training(task, id, settings, np.random.default_rng(args.seed))
     name = f"{task.id}-{id}-seed{args.seed}"
     folder = RunFolder(args.out or find_free(Path("out") / "train" / name))
-    folder.create(training, args.seed)
-    return folder, training, args.seed
+    args = replace(args, episodes=_count_episodes(args, task))
+    folder.create(training, args.seed, {"episodes": args.episodes, "moves": args.moves})
+    return folder, training, args.seed, args
 
 
 def find_free(path: Path) -> Path:
@@ -138,11 +139,15 @@ def find_free(path: Path) -> Path:
     return next(path.with_name(name) for name in names if not path.with_name(name).exists())
 
 
-def _resume(args: Args) -> tuple[RunFolder, Training, int]:
+def _resume(args: Args) -> tuple[RunFolder, Training, int, Args]:
+    """Opens a run that goes on to where it was to end, or to where it is told to now."""
     assert args.resume is not None
     folder = RunFolder(args.resume)
     training, seed = folder.open()
-    return folder, training, seed
+    if args.episodes is None and args.moves is None:
+        ends = folder.read_ends()
+        args = replace(args, episodes=ends.get("episodes"), moves=ends.get("moves"))
+    return folder, training, seed, args
 
 
 def _given(args: Args) -> dict[str, Any]:
@@ -161,9 +166,10 @@ def _explore(args: Args, task: Task) -> Exploration:
     epsilon = 1.0 if args.epsilon is None else args.epsilon
     fall = args.epsilon_per_episode
     if fall is None:
-        fall = 0.0 if args.epsilon_per_success else 2.0 * epsilon / _count_episodes(args, task)
+        half = 2.0 * epsilon / _count_episodes(args, task)
+        fall = 0.0 if args.epsilon_per_success else min(half, 1.0)
     return Exploration(
-        epsilon=epsilon, per_episode=min(fall, 1.0), per_success=args.epsilon_per_success or 0.0
+        epsilon=epsilon, per_episode=fall, per_success=args.epsilon_per_success or 0.0
     )
 
 
@@ -187,17 +193,20 @@ def _train(training: Training, folder: RunFolder, args: Args) -> Episodes:
     parts: list[Episodes] = []
     unsaved: list[Episodes] = []
     saved = time.monotonic()
-    try:
-        with show_progress(f"{training.learner_id} on {training.task.id}", episodes) as show:
-            for ended in training.advance_in_chunks(moves, episodes):
-                parts.append(ended)
-                unsaved.append(ended)
-                show(len(ended))
-                if time.monotonic() - saved > SAVE_SECONDS:
-                    folder.save(training, join(unsaved))
-                    unsaved, saved = [], time.monotonic()
-    finally:
+    what = f"{training.learner_id} on {training.task.id}"
+    with show_progress(what, episodes) as show, defer_interrupt() as is_interrupted:
+        for ended in training.advance_in_chunks(moves, episodes):
+            parts.append(ended)
+            unsaved.append(ended)
+            show(len(ended))
+            if is_interrupted():
+                break
+            if time.monotonic() - saved > SAVE_SECONDS:
+                folder.save(training, join(unsaved))
+                unsaved, saved = [], time.monotonic()
         folder.save(training, join(unsaved))
+        if is_interrupted():
+            raise KeyboardInterrupt
     return join(parts)
 
 

@@ -18,7 +18,7 @@ from learning.learner import make_learner
 from learning.learners.round_robin import get_learning_rate
 from learning.mediators import find_highest
 from learning.records import Learner, Memory
-from learning.settings import LearnerSettings
+from learning.settings import LearnerSettings, get_options
 from learning.tables import claim, find
 
 
@@ -38,6 +38,7 @@ def make(
     task: Task, settings: LearnerSettings, generator: np.random.Generator
 ) -> tuple[Learner, Memory]:
     """Makes the learner; see `learning.learner.make_learner`."""
+    get_options(settings, {})
     rule, own = Central(float(settings.discount)), Last(np.full(1, -1, np.int64))
     return make_learner(task, settings, rule, generator, own)
 

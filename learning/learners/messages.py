@@ -18,7 +18,7 @@ from learning.learner import make_learner
 from learning.learners.round_robin import learn
 from learning.mediators import find_highest
 from learning.records import Learner, Memory
-from learning.settings import LearnerSettings
+from learning.settings import LearnerSettings, get_options
 from learning.tables import find
 
 
@@ -38,6 +38,7 @@ def make(
     task: Task, settings: LearnerSettings, generator: np.random.Generator
 ) -> tuple[Learner, Memory]:
     """Makes the learner; see `learning.learner.make_learner`."""
+    get_options(settings, {})
     n_values = sum(module.kind == "value" for module in settings.modules)
     own = Inbox(np.zeros((task.n_agents, n_values)))
     return make_learner(task, settings, Messages(float(settings.discount)), generator, own)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.compiled import jitable
+from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.task import Task
 from learning import rules
@@ -65,7 +66,11 @@ def make(
     check_range("xi_step", options["xi_step"], 0.0, 1e9)
     check_range("xi_most", options["xi_most"], 0.0, 1e9)
     check_range("settle_episodes", options["settle_episodes"], 0, 1e12)
-    goal = next(module for module in settings.modules if module.kind == "value")
+    values = [module for module in settings.modules if module.kind == "value"]
+    if len(values) > 1:
+        names = [module.name for module in values]
+        raise InputError("modules", names, "one value module alone for risk-q")
+    goal = values[0]
     risk = Module(name="risk", variables=goal.variables)
     others = [module for module in settings.modules if module.kind == "veto"]
     settings = dataclasses.replace(settings, modules=(goal, risk, *others))

@@ -17,7 +17,7 @@ from learning import rules
 from learning.learner import make_learner
 from learning.mediators import find_highest
 from learning.records import MOVES, Learner, Memory
-from learning.settings import LearnerSettings
+from learning.settings import LearnerSettings, get_options
 from learning.tables import claim, find
 
 
@@ -36,6 +36,7 @@ def make(
     task: Task, settings: LearnerSettings, generator: np.random.Generator
 ) -> tuple[Learner, Memory]:
     """Makes the learner of eq. 6.4, which discounts every move (see `make_learner`)."""
+    get_options(settings, {})
     discounts = float(settings.discount) ** np.arange(task.n_agents + 1.0)
     return make_learner(task, settings, RoundRobin(discounts), generator)
 
@@ -44,6 +45,7 @@ def make_cycle_sum(
     task: Task, settings: LearnerSettings, generator: np.random.Generator
 ) -> tuple[Learner, Memory]:
     """Makes the learner of Algorithm 4.1, which discounts whole cycles (see `make_learner`)."""
+    get_options(settings, {})
     discounts = np.ones(task.n_agents + 1)
     discounts[-1] = settings.discount
     return make_learner(task, settings, RoundRobin(discounts), generator)

@@ -19,7 +19,7 @@ from learning.learners.round_robin import add_rewards, get_learning_rate
 from learning.mediators import find_highest
 from learning.records import Learner, Memory
 from learning.settings import LearnerSettings, check_range, get_options
-from learning.tables import claim, find
+from learning.tables import FIRST_CAPACITY, claim, find
 
 OPTIONS = {"trace_decay": 0.9, "n_kept": 50}
 """lambda, and how many moves of an agent are remembered."""
@@ -63,9 +63,12 @@ def make(
     """
     options = get_options(settings, OPTIONS)
     check_range("trace_decay", options["trace_decay"], 0.0, 1.0)
-    check_range("n_kept", options["n_kept"], 1, 10_000)
-    n_agents, n_kept = task.n_agents, int(options["n_kept"])
+    n_agents = task.n_agents
     n_values = sum(module.kind == "value" for module in settings.modules)
+    # One move may write the whole trail of every agent, into the free half of a hashed table.
+    most = FIRST_CAPACITY // 2 // (n_agents * n_values)
+    check_range("n_kept", options["n_kept"], 1, most)
+    n_kept = int(options["n_kept"])
     own = Trail(
         keys=np.zeros((n_agents, n_kept, n_values), np.int64),
         actions=np.zeros((n_agents, n_kept), np.int64),
@@ -78,41 +81,37 @@ def make(
 
 
 @jitable
-def is_same(trail, agent, one, other):  # type: ignore[no-untyped-def]
-    """Whether two remembered moves are the same action in what looks like the same state."""
-    same = trail.actions[agent, one] == trail.actions[agent, other]
+def is_last(memory, agent, place):  # type: ignore[no-untyped-def]
+    """Whether a remembered move is the agent's last action in what looks like the same state."""
+    trail = memory.own
+    same = trail.actions[agent, place] == memory.actions[agent]
     for module in range(trail.keys.shape[2]):
-        same &= trail.keys[agent, one, module] == trail.keys[agent, other, module]
+        same &= trail.keys[agent, place, module] == memory.last_keys[agent, module]
     return same
 
 
 @jitable
-def copy_move(trail, agent, source, target):  # type: ignore[no-untyped-def]
-    """Copies a remembered move to another place."""
-    trail.actions[agent, target] = trail.actions[agent, source]
-    trail.ages[agent, target] = trail.ages[agent, source]
-    for module in range(trail.keys.shape[2]):
-        trail.keys[agent, target, module] = trail.keys[agent, source, module]
-
-
-@jitable
 def remember(memory, agent):  # type: ignore[no-untyped-def]
-    """Puts the agent's last move first; an earlier one like it is replaced."""
+    """Puts the agent's last move first; it replaces an earlier one like it, or the oldest."""
     trail = memory.own
-    length = min(trail.lengths[agent] + 1, trail.ages.shape[1])
-    for place in range(length - 1, 0, -1):
-        copy_move(trail, agent, place - 1, place)
+    length = trail.lengths[agent]
+    free = 0
+    while free < length and not is_last(memory, agent, free):
+        free += 1
+    if free == length:
+        length = min(length + 1, trail.ages.shape[1])
+        free = length - 1
+    for place in range(length):
         trail.ages[agent, place] += 1
+    for place in range(free, 0, -1):
+        trail.actions[agent, place] = trail.actions[agent, place - 1]
+        trail.ages[agent, place] = trail.ages[agent, place - 1]
+        for module in range(trail.keys.shape[2]):
+            trail.keys[agent, place, module] = trail.keys[agent, place - 1, module]
     trail.actions[agent, 0] = memory.actions[agent]
     trail.ages[agent, 0] = 0
     for module in range(trail.keys.shape[2]):
         trail.keys[agent, 0, module] = memory.last_keys[agent, module]
-    for place in range(1, length):
-        if is_same(trail, agent, place, 0):
-            for later in range(place, length - 1):
-                copy_move(trail, agent, later + 1, later)
-            length -= 1
-            break
     trail.lengths[agent] = length
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,14 @@ import hose_mj
 from hose_mj.errors import InputError
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.parquet import write_columns
-from learning.study.saving import compute_identity, describe, load_memory, remake, save_memory
+from learning.study.saving import (
+    DESCRIPTION,
+    compute_identity,
+    describe,
+    load_memory,
+    remake,
+    save_memory,
+)
 from learning.study.training import Episodes, Training
 
 CONFIG, SUMMARY, CHECKPOINT = "config.json", "summary.json", "checkpoints/last.npz"
@@ -34,8 +42,15 @@ class RunFolder:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
 
-    def create(self, training: Training, seed: int) -> None:
+    def create(
+        self, training: Training, seed: int, ends: Mapping[str, int | None] | None = None
+    ) -> None:
         """Writes the settings of a new run.
+
+        Args:
+            training: before its first move.
+            seed: what its generator was made from.
+            ends: episodes and moves after which it is to end; no part of its identity.
 
         Raises:
             InputError: the folder holds a run already.
@@ -45,7 +60,8 @@ class RunFolder:
         description = describe(training, seed)
         config = {
             **description,
-            "identity": compute_identity(json.loads(json.dumps(description))),
+            "identity": compute_identity(description),
+            "ends": dict(ends or {}),
             "versions": {
                 "hose_mj": hose_mj.__version__,
                 "numpy": np.__version__,
@@ -61,10 +77,26 @@ class RunFolder:
             InputError: no run is in the folder, or a file of it is damaged.
         """
         config = self.read(CONFIG)
-        training = remake(config)
+        description = {name: config.get(name) for name in DESCRIPTION}
+        if compute_identity(description) != config.get("identity"):
+            valid = "the settings that the run began with (its identity differs)"
+            raise InputError("file", str(self.path / CONFIG), valid)
+        training = remake(description)
         if (self.path / CHECKPOINT).exists():
             training.restore(load_memory(self.path / CHECKPOINT, training.memory))
         return training, int(config["seed"])
+
+    def read_ends(self) -> dict[str, int | None]:
+        """Returns the episodes and moves after which the run was to end, None where not said.
+
+        Raises:
+            InputError: they are no whole numbers.
+        """
+        ends = self.read(CONFIG).get("ends")
+        values = ends.values() if isinstance(ends, dict) else [ends or "missing"]
+        if not all(value is None or isinstance(value, int) for value in values):
+            raise InputError("ends", ends, f"whole numbers or null, in {self.path / CONFIG}")
+        return dict(ends or {})
 
     def save(self, training: Training, ended: Episodes) -> None:
         """Writes the episodes that ended since the last time, then the checkpoint."""

@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,11 @@ from learning.modules import Module
 from learning.records import Memory
 from learning.settings import Exploration, LearnerSettings
 from learning.study.training import Training
+from learning.tables import is_sound
 
 MANIFEST = "manifest.json"
+DESCRIPTION = ("task", "task_options", "learner", "learner_settings", "seed")
+"""What `describe` returns."""
 Arrays = dict[str, npt.NDArray[Any]]
 
 
@@ -55,9 +59,11 @@ def remake(description: Mapping[str, Any]) -> Training:
     try:
         task = make_task(description["task"], **_freeze(description["task_options"]))
         settings = read_settings(description["learner_settings"])
-        generator = np.random.default_rng(description["seed"])
+        generator = np.random.default_rng(int(description["seed"]))
         return Training(task, description["learner"], settings, generator)
-    except (KeyError, TypeError, ValueError) as error:
+    except InputError:
+        raise
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         valid = "the settings that a training wrote"
         raise InputError("description", f"{type(error).__name__}: {error}", valid) from None
 
@@ -104,18 +110,22 @@ def unflatten(memory: Any, arrays: Mapping[str, npt.NDArray[Any]], prefix: str =
 
 
 def save_memory(path: Path, memory: Memory) -> None:
-    """Writes a memory, and its SHA-256 into the folder's manifest."""
+    """Writes a memory, and its SHA-256 into the folder's manifest.
+
+    The manifest comes first and keeps the old file's, so a crash between the two harms nothing.
+    """
     stream = io.BytesIO()
     np.savez_compressed(stream, allow_pickle=False, **flatten(memory))
     data = stream.getvalue()
-    write_atomically(path, data)
     manifest = read_manifest(path.parent)
-    manifest[path.name] = hashlib.sha256(data).hexdigest()
+    versions = [data, path.read_bytes()] if path.exists() else [data]
+    manifest[path.name] = [hashlib.sha256(version).hexdigest() for version in versions]
     write_atomically(path.with_name(MANIFEST), json.dumps(manifest, indent=2).encode())
+    write_atomically(path, data)
 
 
-def read_manifest(folder: Path) -> dict[str, str]:
-    """Returns the SHA-256 of each checkpoint in a folder.
+def read_manifest(folder: Path) -> dict[str, list[str]]:
+    """Returns the SHA-256 of each checkpoint in a folder, and that of the one before.
 
     Raises:
         InputError: a manifest that is no JSON object.
@@ -147,21 +157,25 @@ def load_memory(path: Path, like: Memory) -> Memory:
     if not path.is_file():
         raise InputError("checkpoint", str(path), "a file that a training wrote")
     data = path.read_bytes()
-    known = read_manifest(path.parent).get(path.name)
-    if known is not None and known != hashlib.sha256(data).hexdigest():
+    if hashlib.sha256(data).hexdigest() not in read_manifest(path.parent).get(path.name, ()):
         raise InputError("checkpoint", str(path), "the file that was written (its hash differs)")
     wanted = flatten(like)
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile):
+    except (ValueError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
         raise InputError("checkpoint", str(path), "an npz file of arrays, whole") from None
     for name, array in wanted.items():
         if name not in arrays:
             raise InputError("checkpoint", str(path), f"one with the array {name}")
-        is_table = name.startswith(("table.", "vetoes."))
-        fits = arrays[name].dtype == array.dtype and arrays[name].ndim == array.ndim
-        if not fits or (not is_table and arrays[name].shape != array.shape):
+        grows = name.startswith(("table.", "vetoes.")) and len(wanted[name.split(".")[0] + ".keys"])
+        found, dims = arrays[name], slice(1 if grows else 0, None)
+        fits = found.dtype == array.dtype and found.ndim == array.ndim
+        if not fits or found.shape[dims] != array.shape[dims] or (grows and len(found) == 0):
             shape = f"{array.dtype}{array.shape}"
             raise InputError("checkpoint", str(path), f"one where {name} is {shape}")
-    return unflatten(like, arrays)  # type: ignore[no-any-return]
+    memory: Memory = unflatten(like, arrays)
+    for name, table in (("table", memory.table), ("vetoes", memory.vetoes)):
+        if not is_sound(table):
+            raise InputError("checkpoint", str(path), f"one whose {name} has room for its keys")
+    return memory

@@ -180,9 +180,9 @@ class Training:
             InputError: a manner that the learner does not have.
         """
         manner = manner or ("joint" if self.entry.schedule == "joint" else "turns")
-        if (manner == "joint") != (self.entry.schedule == "joint"):
-            valid = "joint" if self.entry.schedule == "joint" else "turns or composed"
-            raise InputError("manner", manner, f"{valid} for {self.learner_id}")
+        valid = ("joint",) if self.entry.schedule == "joint" else ("turns", "composed")
+        if manner not in valid:
+            raise InputError("manner", manner, f"{' or '.join(valid)} for {self.learner_id}")
         results = np.zeros((episodes, 2), np.int64)
         probe = evaluation.make_probe(self.memory)
         arguments: list[Any] = [self.task.kernel, self.learner, probe]

@@ -14,7 +14,7 @@ MEDIATORS = {
     "best-happiness": BEST_HAPPINESS,
     "worst-unhappiness": WORST_UNHAPPINESS,
 }
-"""By name. Maximizing collective happiness, the sum of what all modules expect, is greatest mass."""
+"""By name. Collective happiness is the sum of what all modules expect: the greatest mass."""
 
 
 @jitable

@@ -33,6 +33,12 @@ def find_allowed(allowed, number):  # type: ignore[no-untyped-def]
 
 
 @jitable
+def find_lowest_bit(bits):  # type: ignore[no-untyped-def]
+    """Returns the first of some actions given as bits."""
+    return find_allowed(bits, 0)
+
+
+@jitable
 def draw_allowed(allowed, stream):  # type: ignore[no-untyped-def]
     """Draws an allowed action, all equally likely."""
     count = count_allowed(allowed)

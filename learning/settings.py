@@ -1,4 +1,4 @@
-"""All settings of a learner as data: what an experiment records, and what an identity is made of."""
+"""All settings of a learner as data: what a run is identified by."""
 
 from __future__ import annotations
 
@@ -98,3 +98,21 @@ def check_range(name: str, value: object, low: float, high: float) -> None:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not low <= value <= high:  # type: ignore[operator]
         raise InputError(name, value, f"a number from {low:g} to {high:g}")
+
+
+def get_options(
+    settings: LearnerSettings, defaults: Mapping[str, float | str]
+) -> dict[str, float | str]:
+    """Returns a rule's own options, the defaults where none are given.
+
+    Raises:
+        InputError: an unknown option, or text where a number belongs or the other way round.
+    """
+    for name, value in settings.options.items():
+        if name not in defaults:
+            known = ", ".join(defaults) or "none: this learner has no options of its own"
+            raise InputError("learner's option", name, f"one of {known}")
+        if isinstance(value, str) != isinstance(defaults[name], str):
+            kind = "a word" if isinstance(defaults[name], str) else "a number"
+            raise InputError(name, value, kind)
+    return {**defaults, **settings.options}

@@ -12,9 +12,12 @@ import numpy as np
 
 from hose_mj.compiled import jitable
 from hose_mj.tasks.kernels import Floats
+from hose_mj.tasks.task import Task
 from learning import rules
+from learning.learner import make_learner
 from learning.mediators import find_highest
-from learning.records import MOVES
+from learning.records import MOVES, Learner, Memory
+from learning.settings import LearnerSettings
 from learning.tables import claim, find
 
 
@@ -29,16 +32,21 @@ class RoundRobin(NamedTuple):
     discounts: Floats
 
 
-def make_round_robin(n_agents: int, discount: float) -> RoundRobin:
-    """Makes the rule of eq. 6.4, which discounts every move."""
-    return RoundRobin(discount ** np.arange(n_agents + 1.0))
+def make(
+    task: Task, settings: LearnerSettings, generator: np.random.Generator
+) -> tuple[Learner, Memory]:
+    """Makes the learner of eq. 6.4, which discounts every move (see `make_learner`)."""
+    discounts = float(settings.discount) ** np.arange(task.n_agents + 1.0)
+    return make_learner(task, settings, RoundRobin(discounts), generator)
 
 
-def make_cycle_sum(n_agents: int, discount: float) -> RoundRobin:
-    """Makes the rule of Algorithm 4.1, which discounts whole cycles."""
-    discounts = np.ones(n_agents + 1)
-    discounts[-1] = discount
-    return RoundRobin(discounts)
+def make_cycle_sum(
+    task: Task, settings: LearnerSettings, generator: np.random.Generator
+) -> tuple[Learner, Memory]:
+    """Makes the learner of Algorithm 4.1, which discounts whole cycles (see `make_learner`)."""
+    discounts = np.ones(task.n_agents + 1)
+    discounts[-1] = settings.discount
+    return make_learner(task, settings, RoundRobin(discounts), generator)
 
 
 @jitable
@@ -74,10 +82,9 @@ def meet(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
         learn(learner, memory, agent, module, rule.discounts[-1] * highest)
 
 
-@rules.gather.register(RoundRobin)
 @jitable
-def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
-    """Adds r_(t+k), discounted, to the cycle of everyone who has moved."""
+def add_rewards(rule, learner, memory, agent, events):  # type: ignore[no-untyped-def]
+    """Adds r_(t+k), discounted, to the cycle of everyone who has moved; the agent's begins."""
     for module in range(learner.bases.shape[0]):
         memory.rewards[agent, module] = 0.0
     for other in range(memory.waited.shape[0]):
@@ -87,6 +94,13 @@ def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-unt
                 reward = learner.rewards[events, int(other == agent), module]
                 memory.rewards[other, module] += rule.discounts[waited] * reward
             memory.waited[other] = waited + 1
+
+
+@rules.gather.register(RoundRobin)
+@jitable
+def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+    """The others' rewards of a cycle count as one's own."""
+    add_rewards(rule, learner, memory, agent, events)
 
 
 @rules.finish.register(RoundRobin)

@@ -1,0 +1,1 @@
+"""Training runs, their tests and their statistics."""

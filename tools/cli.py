@@ -30,6 +30,9 @@ COMMANDS = {
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
+    "relevance": Command(
+        "tools.relevance", "find the state variables that matter for each constraint"
+    ),
 }
 
 

@@ -7,7 +7,7 @@ tell apart, the sooner it knows them all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,30 +42,20 @@ class Relevance:
     """What Algorithm 5.1 found.
 
     Attributes:
-        variables: the variables tested, in their order in the log.
+        variables: the variables tested, as they were given.
         signals: the signals.
         relevant: whether a variable matters for a signal (n_variables, n_signals).
         n_seen: logged moves with the signal's event (n_signals,).
-        is_told: whether all variables together tell the signal of every logged pair (n_signals,);
-            where they do not, the algorithm finds whatever it tests first relevant.
     """
 
     variables: tuple[str, ...]
     signals: tuple[Signal, ...]
     relevant: Bools
     n_seen: Integers
-    is_told: Bools
 
-    def list_relevant(self, signal: str) -> tuple[str, ...]:
-        """Returns the variables that matter for a signal.
-
-        Raises:
-            InputError: there is no such signal.
-        """
-        names = [each.name for each in self.signals]
-        if signal not in names:
-            raise InputError("signal", signal, "one of " + ", ".join(names))
-        column = self.relevant[:, names.index(signal)]
+    def list_relevant(self, signal: Signal) -> tuple[str, ...]:
+        """Returns the variables that matter for one of the signals."""
+        column = self.relevant[:, self.signals.index(signal)]
         return tuple(n for n, matters in zip(self.variables, column, strict=True) if matters)
 
 
@@ -79,35 +69,39 @@ def number_rows(columns: npt.ArrayLike) -> Integers:
     for column in table.T:
         radix = int(column.max(initial=0)) + 1
         if size > _LARGEST_NUMBER // radix:
-            numbers = np.unique(numbers, return_inverse=True)[1]
-            size = len(table)
+            numbers, size = np.unique(numbers, return_inverse=True)[1], len(table)
         numbers = numbers * radix + column
         size *= radix
     return np.unique(numbers, return_inverse=True)[1]
 
 
-def is_told_by(columns: npt.ArrayLike, signal: npt.ArrayLike) -> bool:
-    """Whether rows that agree in all columns (n, k) agree in the signal (n,) as well."""
-    rows, values = number_rows(columns), np.asarray(signal)
-    of_row = np.zeros(len(values), values.dtype)
-    of_row[rows] = values  # one of each row's values; all of them, if they agree
-    return bool((of_row[rows] == values).all())
+def count_contradictions(columns: npt.ArrayLike, signal: npt.ArrayLike) -> int:
+    """Counts the rows in which columns (n, k) cannot tell whether a signal (n,) is there.
+
+    Of rows with equal columns these are those with the signal or those without, whichever are
+    fewer; none where the columns tell it.
+    """
+    rows = number_rows(columns)
+    n_all = np.bincount(rows)
+    n_with = np.bincount(rows[np.asarray(signal, np.bool_)], minlength=len(n_all))
+    return int(np.minimum(n_with, n_all - n_with).sum())
 
 
 def sort_by_range(values: Integers) -> list[int]:
     """Returns the columns (n, k) by observed range, the biggest first; a tie keeps their order."""
-    ranges = np.ptp(values, axis=0) if len(values) else np.zeros(values.shape[1], np.int64)
-    return [int(k) for k in np.argsort(-ranges, kind="stable")]
+    if len(values) == 0:
+        return list(range(values.shape[1]))
+    return [int(k) for k in np.argsort(-np.ptp(values, axis=0), kind="stable")]
 
 
-def find_relevant(values: Integers, moves: Integers, signal: npt.ArrayLike) -> Bools:
+def find_relevant(values: Integers, moves: Integers, signal: Bools) -> Bools:
     """Runs Algorithm 5.1 for one signal.
 
     Args:
         values: of the variables, before each move (n, n_variables).
-        moves: what must be the same for two rows to be compared: the action, and who acted where
+        moves: what two rows must have in common to be compared: the action, and who acted where
             agents are told apart (n,).
-        signal: what the move caused (n,).
+        signal: whether the move caused it (n,).
 
     Returns:
         Whether each variable matters (n_variables,).
@@ -116,9 +110,9 @@ def find_relevant(values: Integers, moves: Integers, signal: npt.ArrayLike) -> B
     for variable in list(kept):
         if len(kept) == 1:
             break
-        # X' <- X_j - {x_i}: pairs (s, a), (s', a) with s' |= [s]_X' and another signal?
+        # X' <- X_j - {x_i}: are there (s, a), (s', a) with s' |= [s]_X' and different signals?
         left = [column for column in kept if column != variable]
-        if is_told_by(np.column_stack([moves, values[:, left]]), signal):
+        if count_contradictions(np.column_stack([moves, values[:, left]]), signal) == 0:
             kept = left
     relevant = np.zeros(values.shape[1], np.bool_)
     relevant[kept] = True
@@ -128,28 +122,47 @@ def find_relevant(values: Integers, moves: Integers, signal: npt.ArrayLike) -> B
 def list_signals(task: Task) -> tuple[Signal, ...]:
     """Lists one signal for each event that breaks a constraint.
 
-    Where one agent moves robot k with actions named `.._k`, each robot has a signal of its own:
-    R_k of section 5.5.1.
+    Where a single agent names the robot to move (`up_2`), each robot has a signal of its own, R_i
+    of section 5.5.1.
     """
     events = [name for bit, name in enumerate(task.events) if task.kernel.violations >> bit & 1]
-    tails = sorted({name.rpartition("_")[2] for name in task.action_names})
-    if task.n_agents > 1 or not all(tail.isdigit() for tail in tails) or "+" in task.action_names[0]:
+    robots = sorted({name.partition("_")[2] for name in task.action_names})
+    if not all(robot.isdigit() for robot in robots):
         return tuple(Signal(event, event) for event in events)
-    return tuple(
-        Signal(
-            f"{event}_{tail}",
-            event,
-            tuple(a for a in task.action_names if a.endswith(f"_{tail}")),
+    actions = {
+        robot: tuple(name for name in task.action_names if name.endswith(f"_{robot}"))
+        for robot in robots
+    }
+    return tuple(Signal(f"{e}_{robot}", e, actions[robot]) for e in events for robot in robots)
+
+
+def list_candidates(task: Task, experience: Experience) -> tuple[str, ...]:
+    """Lists the variables to test: what everyone sees alike, then what each agent sees for itself.
+
+    Of equal ranges the first is tested, and so removed, first: an agent's own variables are kept
+    rather than the team's. What everyone sees and one agent has as a variable of its own (`r_n_2`
+    of the formation is robot 1's `r_p`) is left out: of two copies only one can be relevant.
+    """
+    own = [k for k, variable in enumerate(task.variables) if variable.per_agent]
+    shared = [k for k in range(len(task.variables)) if k not in own]
+
+    def is_copy(column: int) -> bool:
+        return any(
+            task.variables[column].cardinality == task.variables[other].cardinality
+            and bool((moves.values[:, column] == moves.values[:, other]).all())
+            for moves in map(experience.select, range(task.n_agents))
+            for other in own
+            if len(moves)
         )
-        for event in events
-        for tail in tails
-    )
+
+    kept = [k for k in shared if not is_copy(k)]
+    return tuple(task.variables[k].name for k in (*kept, *own))
 
 
 def find_relevance(
     experience: Experience,
     signals: Sequence[Signal],
-    variables: Sequence[str] | None = None,
+    variables: Sequence[str],
     pooled: bool = False,
 ) -> Relevance:
     """Runs Algorithm 5.1 on logged moves.
@@ -157,37 +170,68 @@ def find_relevance(
     Args:
         experience: the log.
         signals: see `list_signals`.
-        variables: those to test; all of the log's by default.
-        pooled: whether moves of different agents are compared, which assumes that their modules
-            could share one table; by default each agent's are compared with its own.
+        variables: those to test, see `list_candidates`.
+        pooled: whether moves of different agents are compared, as if their modules shared one
+            table; by default an agent's are compared with its own.
 
     Raises:
-        InputError: an unknown variable, event or action, or none at all.
+        InputError: an unknown variable, event or action, or no variable at all.
     """
-    names = experience.variables if variables is None else tuple(variables)
-    if not names:
-        raise InputError("variables", names, "at least one of " + ", ".join(experience.variables))
-    columns = [_find("variable", name, experience.variables) for name in names]
-    n_actions = len(experience.action_names)
-    agents = np.zeros_like(experience.agents) if pooled else experience.agents
-    relevant = np.zeros((len(names), len(signals)), np.bool_)
+    if not variables:
+        raise InputError("variables", (), "at least one of " + ", ".join(experience.variables))
+    relevant = np.zeros((len(variables), len(signals)), np.bool_)
     n_seen = np.zeros(len(signals), np.int64)
-    is_told = np.zeros(len(signals), np.bool_)
     for place, signal in enumerate(signals):
-        bit = _find("event", signal.event, experience.event_names)
-        rows = np.ones(len(experience), np.bool_)
-        if signal.actions:
-            rows = np.isin(
-                experience.actions,
-                [_find("action", name, experience.action_names) for name in signal.actions],
-            )
-        values = experience.values[rows][:, columns]
-        moves = (agents * n_actions + experience.actions)[rows]
-        happened = experience.events[rows] >> bit & 1
+        values, moves, happened = select_rows(experience, signal, variables, pooled)
         relevant[:, place] = find_relevant(values, moves, happened)
         n_seen[place] = happened.sum()
-        is_told[place] = is_told_by(np.column_stack([moves, values]), happened)
-    return Relevance(tuple(names), tuple(signals), relevant, n_seen, is_told)
+    return Relevance(tuple(variables), tuple(signals), relevant, n_seen)
+
+
+def select_rows(
+    experience: Experience, signal: Signal, variables: Sequence[str], pooled: bool = False
+) -> tuple[Integers, Integers, Bools]:
+    """Returns what concerns a signal: values, moves and whether it happened (`find_relevant`).
+
+    Raises:
+        InputError: an unknown variable, event or action.
+    """
+    columns = [_find("variable", name, experience.variables) for name in variables]
+    bit = _find("event", signal.event, experience.event_names)
+    actions = [
+        _find("action", name, experience.action_names)
+        for name in signal.actions or experience.action_names
+    ]
+    rows = np.isin(experience.actions, actions)
+    agents = np.zeros_like(experience.agents) if pooled else experience.agents
+    moves = agents * len(experience.action_names) + experience.actions
+    happened = (experience.events >> bit & 1).astype(np.bool_)
+    return experience.values[rows][:, columns], moves[rows], happened[rows]
+
+
+def count_unexplained(relevance: Relevance, signal: Signal, experience: Experience) -> int:
+    """Counts moves of a log that a signal's relevant variables do not tell from others."""
+    names = relevance.list_relevant(signal)
+    values, moves, happened = select_rows(experience, signal, names)
+    return count_contradictions(np.column_stack([moves, values]), happened)
+
+
+def make_veto_modules(relevance: Relevance) -> tuple[Module, ...]:
+    """Makes a veto module for each signal, of the variables that matter for it.
+
+    Nothing is known of an event that never happened in the log, so it gets no module.
+    """
+    return tuple(
+        Module(
+            name=signal.name,
+            kind="veto",
+            variables=relevance.list_relevant(signal),
+            events=(signal.event,),
+            actions=signal.actions,
+        )
+        for signal, n_seen in zip(relevance.signals, relevance.n_seen, strict=True)
+        if n_seen
+    )
 
 
 def _find(thing: str, name: str, names: tuple[str, ...]) -> int:
@@ -195,23 +239,3 @@ def _find(thing: str, name: str, names: tuple[str, ...]) -> int:
     if name not in names:
         raise InputError(thing, name, "one of " + ", ".join(names))
     return names.index(name)
-
-
-def make_veto_modules(relevance: Relevance) -> tuple[Module, ...]:
-    """Makes a veto module for each signal that was seen, of the variables that matter for it.
-
-    Of an event that never happened in the log nothing is known, so it gets no module.
-    """
-    return tuple(_make_modules(relevance))
-
-
-def _make_modules(relevance: Relevance) -> Iterator[Module]:
-    for signal, n_seen in zip(relevance.signals, relevance.n_seen, strict=True):
-        if n_seen:
-            yield Module(
-                name=signal.name,
-                kind="veto",
-                variables=relevance.list_relevant(signal.name),
-                events=(signal.event,),
-                actions=signal.actions,
-            )

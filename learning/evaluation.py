@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hose_mj.compiled import bitwise, jitable
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import STEPS, TURN
@@ -10,20 +12,17 @@ from learning.loop import begin_episode, choose, see
 from learning.records import Memory
 
 
-
 def make_probe(memory: Memory) -> Memory:
     """Makes a memory that shares what was learned and nothing else, so that tests change nothing.
 
     Its random numbers, for ties, go on from where those of the memory stand.
     """
     shared = {"table", "vetoes"}
-    copied = {
-        name: _copy(value) for name, value in memory._asdict().items() if name not in shared
-    }
+    copied = {name: _copy(value) for name, value in memory._asdict().items() if name not in shared}
     return memory._replace(**copied)
 
 
-def _copy(value):  # type: ignore[no-untyped-def]
+def _copy(value: Any) -> Any:
     """Copies an array, or a NamedTuple of arrays."""
     return type(value)(*map(_copy, value)) if isinstance(value, tuple) else value.copy()
 
@@ -56,8 +55,10 @@ def compose(task, learner, memory, start):  # type: ignore[no-untyped-def]
     as where a terminal state is expected.
 
     Args:
-        task, learner, memory: as for the loops.
-        start: work array of the state's length; the state stands in it afterwards, unchanged.
+        task: the task's kernel record.
+        learner: the learner.
+        memory: a probe; its state stays as it is.
+        start: work array of the state's length.
     """
     state = memory.state
     for k in range(state.shape[0]):

@@ -33,6 +33,7 @@ COMMANDS = {
     "relevance": Command(
         "tools.relevance", "find the state variables that matter for each constraint"
     ),
+    "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
 }
 
 

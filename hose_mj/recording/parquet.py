@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
@@ -56,6 +57,13 @@ def write_records(
         text = io.BytesIO()
         pyarrow.csv.write_csv(table, text)
         write_atomically(Path(csv_path), text.getvalue())
+
+
+def write_columns(columns: Mapping[str, npt.NDArray[Any]], parquet_path: Path) -> None:
+    """Writes one-dimensional arrays of equal length as columns; the file is replaced at once."""
+    sink = pa.BufferOutputStream()
+    pyarrow.parquet.write_table(pa.table(dict(columns)), sink, compression="zstd")
+    write_atomically(Path(parquet_path), sink.getvalue().to_pybytes())
 
 
 def read_records(parquet_path: Path) -> tuple[list[Record], dict[str, str]]:

@@ -30,6 +30,9 @@ COMMANDS = {
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
+    "joint-policy": Command(
+        "tools.joint_policy", "compose what agents learned in turns into joint moves"
+    ),
     "relevance": Command(
         "tools.relevance", "find the state variables that matter for each constraint"
     ),

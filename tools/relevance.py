@@ -123,7 +123,9 @@ def _print(found: list[Relevance], checks: list[Check], title: str) -> None:
     for signal in first.signals:
         table.add_column(signal.name, justify="center")
     for row, variable in enumerate(first.variables):
-        counts = [sum(int(each.relevant[row, k]) for each in found) for k in range(len(first.signals))]
+        counts = [
+            sum(int(each.relevant[row, k]) for each in found) for k in range(len(first.signals))
+        ]
         if len(found) == 1:
             cells = ["✓" if count else "" for count in counts]
         else:

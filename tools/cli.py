@@ -37,6 +37,7 @@ COMMANDS = {
         "tools.relevance", "find the state variables that matter for each constraint"
     ),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
+    "transfer": Command("tools.transfer", "start on a task from what was learned on a simpler one"),
 }
 
 

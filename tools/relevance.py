@@ -94,8 +94,10 @@ def run(args: Args) -> int:
 
 def _list(found: list[Relevance]) -> dict[str, Any]:
     """The signals, what matters for them in the first log, and in which share of all logs."""
+    import numpy as np
+
     first = found[0]
-    share = sum(each.relevant.astype(float) for each in found) / len(found)
+    share = np.mean([each.relevant for each in found], axis=0)
     return {
         "variables": first.variables,
         "signals": [

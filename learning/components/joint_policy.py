@@ -204,7 +204,9 @@ def play_composed(
     Args:
         task: the task.
         start: the initial state.
-        estimates, evaluate, discount: see `compose`.
+        estimates: of each agent, as for `compose`.
+        evaluate: their Q-values.
+        discount: gamma.
         max_moves: joint moves after which it is given up.
     """
     state, idle = start.copy(), find_idle(task)

@@ -93,6 +93,23 @@ def make_image(source: Task, source_module: Module, target: Task, target_module:
     )
 
 
+@dataclass(frozen=True)
+class Match:
+    """A module that source and target have in common.
+
+    Attributes:
+        name: its name.
+        table: the field of the memory that holds its rows.
+        image: how its keys relate.
+        parts: first key of each agent in the source and in the target.
+    """
+
+    name: str
+    table: str
+    image: Image
+    parts: tuple[tuple[int, int], ...]
+
+
 def transfer(source: Training, target: Training) -> tuple[str, ...]:
     """Starts a learner from what another one has learned on a partially constrained model.
 
@@ -107,35 +124,57 @@ def transfer(source: Training, target: Training) -> tuple[str, ...]:
         The names of the modules that were transferred.
 
     Raises:
-        InputError: agents, actions or modules that do not fit, or a target that has learned.
+        InputError: agents, actions or modules that do not fit, or a target that has learned. The
+            target is then as it was.
+    """
+    if target.moves:
+        raise InputError("moves of the target", target.moves, "0: it must not have learned yet")
+    matches = match_modules(source, target)
+    tables = {"table": target.memory.table, "vetoes": target.memory.vetoes}
+    for match in matches:
+        written = getattr(source.memory, match.table)
+        tables[match.table] = carry(written, tables[match.table], match.image, match.parts)
+    target.restore(target.memory._replace(table=tables["table"], vetoes=tables["vetoes"]))
+    return tuple(match.name for match in matches)
+
+
+def match_modules(source: Training, target: Training) -> list[Match]:
+    """Finds the modules that source and target have in common.
+
+    Raises:
+        InputError: agents, actions or modules that do not fit, nothing in common, or more rows to
+            write than `LARGEST`.
     """
     for name in ("agents", "action_names"):
         ours, theirs = getattr(source.task, name), getattr(target.task, name)
         if ours != theirs:
             raise InputError(f"{name} of the source", ours, f"those of the target, {theirs}")
-    if target.moves:
-        raise InputError("moves of the target", target.moves, "0: it must not have learned yet")
     if describe_rows(source) != describe_rows(target):
         valid = f"one whose tables are laid out as those of {target.learner_id}"
         raise InputError("learner of the source", source.learner_id, valid)
-    names: list[str] = []
-    memory = target.memory
+    matches = []
     for kind, table, bases in (("value", "table", "bases"), ("veto", "vetoes", "veto_bases")):
-        new = getattr(memory, table)
-        for place, other in _pair(source, target, kind):
-            module = _list(source, kind)[place]
-            image = make_image(source.task, module, target.task, _list(target, kind)[other])
-            first_keys = getattr(source.learner, bases)[place]
-            other_first_keys = getattr(target.learner, bases)[other]
-            parts = zip(first_keys.tolist(), other_first_keys.tolist(), strict=True)
-            new = carry(getattr(source.memory, table), new, image, parts)
-            names.append(module.name)
-        memory = memory._replace(**{table: new})
-    if not names:
-        known = [module.name for module in source.settings.modules]
-        raise InputError("modules of the target", (), "with some of the source's, " + str(known))
-    target.restore(memory)
-    return tuple(names)
+        modules = [module for module in source.settings.modules if module.kind == kind]
+        others = [module for module in target.settings.modules if module.kind == kind]
+        names = [module.name for module in others]
+        n_written = len(list_written(getattr(source.memory, table))[0])
+        for place, module in enumerate(modules):
+            if module.name not in names:
+                continue
+            other = names.index(module.name)
+            image = make_image(source.task, module, target.task, others[other])
+            if n_written * len(image.offsets) > LARGEST:
+                n_rows = n_written * len(image.offsets)
+                raise InputError(f"rows of module {module.name}", n_rows, f"at most {LARGEST}")
+            first_keys = getattr(source.learner, bases)[place].tolist()
+            other_first_keys = getattr(target.learner, bases)[other].tolist()
+            parts = tuple(zip(first_keys, other_first_keys, strict=True))
+            matches.append(Match(module.name, table, image, parts))
+    if not matches:
+        known = ", ".join(module.name for module in source.settings.modules)
+        seen = tuple(module.name for module in target.settings.modules)
+        raise InputError("modules of the target", seen, f"some of the source's: {known}")
+    return matches
 
 
 def carry(source: Table, target: Table, image: Image, parts: Iterable[tuple[int, int]]) -> Table:
@@ -145,17 +184,12 @@ def carry(source: Table, target: Table, image: Image, parts: Iterable[tuple[int,
         source: the source's table.
         target: the target's, written in place where it has room.
         image: where keys go.
-        parts: first key of each agent in source and target.
-
-    Raises:
-        InputError: more rows than `LARGEST`.
+        parts: first key of each agent in the source and in the target.
     """
     keys, places = list_written(source)
     for base, other_base in parts:
         own = (keys >= base) & (keys < base + image.size)
         mapped = image.map(keys[own] - base) + other_base
-        if mapped.size > LARGEST:
-            raise InputError("rows to transfer", mapped.size, f"at most {LARGEST}")
         while count_free(target) < mapped.size:
             target = grow(target)
         origins = np.repeat(places[own], mapped.shape[1])
@@ -175,15 +209,3 @@ def list_written(table: Table) -> tuple[Integers, Integers]:
         return table.keys[places] - 1, places
     places = np.flatnonzero(table.rows[:-1].any(axis=1))
     return places, places
-
-
-def _list(training: Training, kind: str) -> list[Module]:
-    """Lists a learner's modules of a kind, in the order of their keys."""
-    return [module for module in training.settings.modules if module.kind == kind]
-
-
-def _pair(source: Training, target: Training, kind: str) -> list[tuple[int, int]]:
-    """Pairs the modules of a kind that have the same name, by their places."""
-    places = {module.name: place for place, module in enumerate(_list(target, kind))}
-    modules = enumerate(_list(source, kind))
-    return [(place, places[m.name]) for place, m in modules if m.name in places]

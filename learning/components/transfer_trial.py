@@ -17,7 +17,7 @@ import numpy as np
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
-from learning.components.transfer import transfer
+from learning.components.transfer import match_modules, transfer
 from learning.learners import catalog
 from learning.settings import Exploration
 from learning.study.training import Training
@@ -81,8 +81,9 @@ def run_trial(plan: Plan, generator: np.random.Generator) -> Outcome:
     """
     source_task, target_task = make_tasks(plan, generator)
     source = _make(source_task, Exploration(per_success=PER_SUCCESS), generator)
-    source.advance(moves=plan.moves)
     target = _make(target_task, Exploration(epsilon=0.0), generator)
+    match_modules(source, target)  # better now than after the training
+    source.advance(moves=plan.moves)
     modules = transfer(source, target)
     before = list_vetoes(target)
     ended = target.advance(episodes=plan.episodes)

@@ -14,6 +14,7 @@ from hose_mj.tasks.exact import enumerate_turns
 from hose_mj.tasks.kernels import TURN
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import draw_below, make_stream
+from learning.components import transfer as transfer_module
 from learning.components import transfer_trial
 from learning.components.joint_policy import make_key
 from learning.components.q_values import make_evaluate
@@ -241,6 +242,19 @@ def test_what_does_not_fit():
     moved.advance(moves=1)
     with pytest.raises(InputError, match="must not have learned"):
         transfer(corridor, moved)
+
+
+def test_too_much_to_copy(monkeypatch):
+    source = make_training(make_task("taxi", **ONE_TAXI))
+    target = make_training(make_task("taxi", **TWO_PASSENGERS))
+    fill(source, 7)
+    monkeypatch.setattr(transfer_module, "LARGEST", 75 * 3 - 1)
+    with pytest.raises(InputError, match="rows of module goal is 225; valid: at most 224"):
+        transfer(source, target)
+    assert not target.memory.table.rows.any()
+    monkeypatch.setattr(transfer_module, "LARGEST", 2)
+    with pytest.raises(InputError, match="variables that only the target sees"):
+        transfer(source, target)
 
 
 PLAN = Plan(

@@ -60,7 +60,8 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def decorator(function: Callable[..., Any]) -> Any:
         made = numba.njit(**{**_OPTIONS, **options})(function)
-        own = getattr(made._cache, "_impl", None)  # none where numba finds no place for a cache
+        # None where numba finds no place for a cache, or where NUMBA_DISABLE_JIT is set.
+        own = getattr(getattr(made, "_cache", None), "_impl", None)
         if own is not None and _ROOT in Path(function.__code__.co_filename).resolve().parents:
             name = f"{own.filename_base}.{_find_fingerprint(function)}"
             stamp = own.locator.get_source_stamp()

@@ -17,6 +17,8 @@ from hose_mj.tasks.kernels import Integers
 
 LARGEST_DENSE = 2**21
 """Most rows of a dense table; above that, visited rows side by side beat rows in their places."""
+DENSE_WIDTH = 8
+"""Longest rows of which there may be so many; of longer ones there may be fewer."""
 FIRST_CAPACITY = 2**14
 LARGEST_LOAD = 0.5
 """Share of the slots that may be taken; beyond it the probes grow long."""
@@ -45,10 +47,10 @@ def make_table(size: int, width: int, dtype: npt.DTypeLike, hashed: bool | None 
         size: the keys are 0 .. size - 1.
         width: length of a row.
         dtype: type of the entries.
-        hashed: whether to hash; by default where the rows exceed `LARGEST_DENSE`.
+        hashed: whether to hash; by default where `LARGEST_DENSE` is exceeded.
     """
     if hashed is None:
-        hashed = size > LARGEST_DENSE
+        hashed = size * max(width, DENSE_WIDTH) > LARGEST_DENSE * DENSE_WIDTH
     capacity = FIRST_CAPACITY if hashed else size
     keys = np.zeros(capacity if hashed else 0, np.int64)
     return Table(keys, np.zeros(1, np.int64), np.zeros((capacity + 1, width), dtype))

@@ -36,6 +36,9 @@ COMMANDS = {
     "relevance": Command(
         "tools.relevance", "find the state variables that matter for each constraint"
     ),
+    "reproduce": Command(
+        "tools.reproduce", "repeat the thesis's experiments over seeds, beside its numbers"
+    ),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
     "transfer": Command("tools.transfer", "start on a task from what was learned on a simpler one"),
 }

@@ -59,9 +59,7 @@ def run(args: Args) -> int:
     from learning.components.joint_policy import count_fewest_moves, estimate, play_composed
     from learning.components.q_values import make_evaluate
 
-    for name, least in (("episodes", 1), ("moves", 1), ("seed", 0)):
-        if getattr(args, name) < least:
-            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    _check(args)
     begun = time.perf_counter()
     task = make_task(args.task, **parse_options(args.set))
     training_seed, play_seed, start_seed = np.random.default_rng(args.seed).spawn(3)
@@ -93,15 +91,23 @@ def run(args: Args) -> int:
     return 0 if passed == len(checks) else 1
 
 
+def _check(args: Args) -> None:
+    from learning.learners import catalog
+
+    for name, least in (("episodes", 1), ("moves", 1), ("seed", 0)):
+        if getattr(args, name) < least:
+            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    if not catalog.find_learner(args.learner).composes:
+        known = [id for id, entry in catalog.LEARNERS.items() if entry.composes]
+        raise InputError("learner", args.learner, "one of " + ", ".join(known))
+
+
 def _train(task: Task, args: Args, generator: Any) -> Training:
     from hose_mj.compiled import compile_notice
     from learning.learners import catalog
     from learning.settings import Exploration
     from learning.study.training import Training
 
-    if not catalog.find_learner(args.learner).composes:
-        known = [id for id, entry in catalog.LEARNERS.items() if entry.composes]
-        raise InputError("learner", args.learner, "one of " + ", ".join(known))
     exploration = Exploration(per_episode=min(1.0, 2.0 / args.episodes))
     settings = catalog.make_settings(args.learner, task, exploration=exploration)
     training = Training(task, args.learner, settings, generator)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -50,36 +50,12 @@ class Args:
 
 
 def run(args: Args) -> int:
-    """Runs all configurations; 1 if a veto was lost or the dearest control did better."""
-    import numpy as np
-
+    """Runs all configurations; 1 if a veto was lost or the first control did better."""
     from hose_mj.checks import Check
-    from hose_mj.compiled import compile_notice
-    from learning.components.transfer_trial import Plan, run_trial
-    from tools.progress import show_progress
 
-    for name, least in (("moves", 1), ("episodes", 1), ("configurations", 1), ("seed", 0)):
-        if getattr(args, name) < least:
-            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
-    if not args.exchange or min(args.exchange) <= 0.0:
-        raise InputError("exchange", args.exchange, "numbers above 0, at least one")
+    _check(args)
     begun = time.perf_counter()
-    plan = Plan(
-        source=args.source,
-        target=args.target,
-        source_options=parse_options(args.source_set),
-        target_options=parse_options(args.target_set),
-        moves=args.moves,
-        episodes=args.episodes,
-        exchange=args.exchange,
-    )
-    outcomes = []
-    generators = np.random.default_rng(args.seed).spawn(args.configurations)
-    with show_progress("configurations", len(generators)) as advance:
-        for generator in generators:
-            with compile_notice("learner's kernels"):
-                outcomes.append(run_trial(plan, generator))
-            advance(1)
+    outcomes = _run_all(args)
     rows = summarize(outcomes, args.exchange)
     ahead = rows[args.episodes]["reached"] - rows[-len(args.exchange)]["reached"]
     checks = [
@@ -97,6 +73,41 @@ def run(args: Args) -> int:
     stream = sys.stderr if args.json else sys.stdout
     print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
     return 0 if passed == len(checks) else 1
+
+
+def _check(args: Args) -> None:
+    for name, least in (("moves", 1), ("episodes", 1), ("configurations", 1), ("seed", 0)):
+        if getattr(args, name) < least:
+            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    if not args.exchange or min(args.exchange) <= 0.0:
+        raise InputError("exchange", args.exchange, "numbers above 0, at least one")
+
+
+def _run_all(args: Args) -> list[Outcome]:
+    """Runs one configuration after the other, each with a generator of its own."""
+    import numpy as np
+
+    from hose_mj.compiled import compile_notice
+    from learning.components.transfer_trial import Plan, run_trial
+    from tools.progress import show_progress
+
+    plan = Plan(
+        source=args.source,
+        target=args.target,
+        source_options=parse_options(args.source_set),
+        target_options=parse_options(args.target_set),
+        moves=args.moves,
+        episodes=args.episodes,
+        exchange=args.exchange,
+    )
+    with compile_notice("learner's kernels"):  # a short trial has everything compiled
+        run_trial(replace(plan, moves=1), np.random.default_rng(0))
+    outcomes = []
+    with show_progress("configurations", args.configurations) as advance:
+        for generator in np.random.default_rng(args.seed).spawn(args.configurations):
+            outcomes.append(run_trial(plan, generator))
+            advance(1)
+    return outcomes
 
 
 def summarize(outcomes: list[Outcome], exchange: tuple[float, ...]) -> list[dict[str, Any]]:

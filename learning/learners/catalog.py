@@ -115,6 +115,55 @@ LEARNERS: dict[str, LearnerEntry] = {
         section="3.2.1 (Geibel)",
         description="a second table learns the risk of breaking a constraint",
     ),
+    "d-ql": LearnerEntry(
+        file="distributed_q",
+        schedule="joint",
+        section="3.6.1 (Lauer and Riedmiller)",
+        description="agents that move at once, each of whom takes the best that ever followed",
+        values="monolithic",
+    ),
+    "team-q": LearnerEntry(
+        file="team_q",
+        schedule="joint",
+        section="3.1, team learning",
+        description="one table over the joint actions of all agents",
+        values="monolithic",
+    ),
+    "hysteretic-q": LearnerEntry(
+        file="hysteretic_q",
+        schedule="joint",
+        section="3.6.1 (Matignon et al.)",
+        description="d-ql that forgets slowly: values fall by a smaller rate than they rise",
+        values="monolithic",
+    ),
+    "distributed-rewards": LearnerEntry(
+        file="distributed_rewards",
+        schedule="joint",
+        section="3.6.1 (Schneider et al.)",
+        description="each agent learns from its neighbours' rewards too",
+        values="monolithic",
+    ),
+    "distributed-values": LearnerEntry(
+        file="distributed_values",
+        schedule="joint",
+        section="3.6.1 (Schneider et al.)",
+        description="each agent learns from its neighbours' values too",
+        values="monolithic",
+    ),
+    "coordinated-q": LearnerEntry(
+        file="coordinated_q",
+        schedule="joint",
+        section="3.6.3 (Guestrin et al.)",
+        description="local values over a coordination graph, one error for all of them",
+        values="monolithic",
+    ),
+    "sparse-q": LearnerEntry(
+        file="sparse_q",
+        schedule="joint",
+        section="3.6.3 (Kok and Vlassis)",
+        description="local values over a coordination graph, an error for each edge or agent",
+        values="monolithic",
+    ),
 }
 
 

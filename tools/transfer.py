@@ -60,7 +60,7 @@ def run(args: Args) -> int:
     ahead = rows[args.episodes]["reached"] - rows[-len(args.exchange)]["reached"]
     checks = [
         Check("transferred vetoes that were lost", sum(o.vetoes_lost for o in outcomes), 0, "=="),
-        Check("goals reached after transfer, less those of the first control", ahead, 0, ">="),
+        Check("goals after transfer, less the first control's", ahead, 0, ">="),
     ]
     if args.json:
         results = {"summary": rows, "outcomes": [asdict(outcome) for outcome in outcomes]}
@@ -129,7 +129,7 @@ def summarize(outcomes: list[Outcome], exchange: tuple[float, ...]) -> list[dict
     found.append(("after transfer, in any of them", [any(o.reached) for o in outcomes]))
     found.append(("greedy on the source", [o.source_reached for o in outcomes]))
     for k, rate in enumerate(exchange):
-        name = f"exploring from scratch, a move costs {rate:,.6g}"
+        name = f"exploring, at rate {rate:,.6g}"
         found.append((name, [o.controls[k][1] for o in outcomes]))
     return [
         {

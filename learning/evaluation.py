@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from hose_mj.compiled import bitwise, jitable
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import STEPS, TURN
@@ -23,8 +25,10 @@ def make_probe(memory: Memory) -> Memory:
 
 
 def _copy(value: Any) -> Any:
-    """Copies an array, or a NamedTuple of arrays."""
-    return type(value)(*map(_copy, value)) if isinstance(value, tuple) else value.copy()
+    """Copies an array, or a NamedTuple of arrays and numbers."""
+    if isinstance(value, tuple):
+        return type(value)(*map(_copy, value))
+    return value.copy() if isinstance(value, np.ndarray) else value
 
 
 @jitable

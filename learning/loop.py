@@ -64,6 +64,7 @@ def choose(task, learner, memory, agent, allowed, explores):  # type: ignore[no-
     """Chooses the agent's action among the allowed, epsilon-greedily (eqs 4.4, 5.2) or soft max."""
     if learner.has_thresholds:
         allowed &= find_above_thresholds(learner, memory, agent, memory.scores.shape[0])
+    allowed = rules.restrict(learner.rule, memory, agent, allowed)
     if allowed == 0:
         if learner.fallback >= 0:
             return learner.fallback

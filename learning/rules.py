@@ -11,6 +11,8 @@ When agents move in turns the loop calls, at each move,
 2. `gather`: it moved, and everyone notes the rewards;
 3. `finish`: the episode ended, so nothing more follows what still waits.
 
+Before a choice it asks `restrict` and `weigh`, which have defaults.
+
 When agents move at once it calls `choose_joint` and `learn_joint`.
 """
 
@@ -39,6 +41,13 @@ def gather(rule: Any, learner: Any, memory: Any, agent: int, action: int, events
 def finish(rule: Any, learner: Any, memory: Any, is_over: bool) -> None:
     """Learns from what still waits when an episode ends, or drops it where one is cut off."""
     raise NotImplementedError(type(rule).__name__)
+
+
+@dispatched
+@jitable
+def restrict(rule, memory, agent, allowed):  # type: ignore[no-untyped-def]
+    """Returns, as bits, what the rule leaves of the allowed actions; by default all of them."""
+    return allowed
 
 
 @dispatched

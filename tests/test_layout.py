@@ -42,10 +42,11 @@ FLOORS = {
     },
 }
 PUBLIC = {
-    *("hose_mj.compiled", "hose_mj.envs", "hose_mj.errors", "hose_mj.recording", "hose_mj.tasks"),
+    *("hose_mj.checks", "hose_mj.compiled", "hose_mj.envs", "hose_mj.errors"),
+    *("hose_mj.recording", "hose_mj.tasks"),
 }
 PACKAGES = ("hose_mj", "learning", "tools")
-HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy"}
+HEAVY = {"gymnasium", "matplotlib", "mujoco", "numba", "pyarrow", "rerun", "scipy", "sklearn"}
 JIT = {"compiled", "inlined", "jit", "jitable", "kernel", "njit", "vectorize", "guvectorize"}
 
 

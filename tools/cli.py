@@ -26,6 +26,9 @@ class Command:
 
 COMMANDS = {
     "bench": Command("tools.bench", "measure speed beside peers that people know"),
+    "classifiers": Command(
+        "tools.classifiers", "measure which classifiers predict undesired moves (chapter 8)"
+    ),
     "compare": Command(
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),

@@ -32,6 +32,8 @@ class LearnerEntry:
         values, vetoes: its modules by default, see `learning.presets`.
         settings: fields of `LearnerSettings` that differ from its defaults.
         composes: whether its greedy policies are composed into joint moves (section 6.4).
+        refresh_moves: moves after which its file's `refresh` is called, in plain Python; 0 for
+            never.
     """
 
     file: str
@@ -43,6 +45,7 @@ class LearnerEntry:
     vetoes: str = "none"
     settings: Mapping[str, Any] = field(default_factory=dict)
     composes: bool = False
+    refresh_moves: int = 0
 
 
 LEARNERS: dict[str, LearnerEntry] = {
@@ -108,6 +111,13 @@ LEARNERS: dict[str, LearnerEntry] = {
         vetoes="modules",
         settings={"learning_rate": 0.1},
         composes=True,
+    ),
+    "usap": LearnerEntry(
+        file="usap",
+        schedule="turns",
+        section="8.2, Algorithms 8.1, 8.3",
+        description="a classifier predicts what would break a constraint, and vetoes it",
+        refresh_moves=200,
     ),
     "risk-q": LearnerEntry(
         file="risk_q",
@@ -226,6 +236,15 @@ def make(
         InputError: an unknown id, or settings that the task or the rule does not allow.
     """
     entry = find_learner(id)
-    module = importlib.import_module(f"learning.learners.{entry.file}")
+    module = _import(entry)
     made = getattr(module, entry.factory)(task, settings, generator)
     return cast("tuple[Learner, Memory]", made)
+
+
+def refresh(id: str, task: Task, settings: LearnerSettings, memory: Memory) -> None:
+    """Lets a learner do what it does from time to time in plain Python, its memory in place."""
+    _import(find_learner(id)).refresh(task, settings, memory)
+
+
+def _import(entry: LearnerEntry) -> Any:
+    return importlib.import_module(f"learning.learners.{entry.file}")

@@ -85,7 +85,7 @@ def flatten(memory: Any, prefix: str = "") -> Arrays:
     for name, value in memory._asdict().items():
         if isinstance(value, tuple):
             arrays |= flatten(value, f"{prefix}{name}.")
-        else:
+        elif isinstance(value, np.ndarray):
             arrays[prefix + name] = value
     return arrays
 
@@ -98,7 +98,7 @@ def unflatten(memory: Any, arrays: Mapping[str, npt.NDArray[Any]], prefix: str =
     for name, value in memory._asdict().items():
         if isinstance(value, tuple):
             fields[name] = unflatten(value, arrays, f"{prefix}{name}.")
-        else:
+        elif isinstance(value, np.ndarray):
             fields[name] = arrays[prefix + name]
     return memory._replace(**fields)
 

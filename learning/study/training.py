@@ -140,6 +140,8 @@ class Training:
         last_episode = 2**62 if episodes is None else self.episodes + episodes
         while self.moves < last_move and self.episodes < last_episode:
             most = min(last_move - self.moves, CHUNK[self._compiled])
+            if self.entry.refresh_moves:
+                most = min(most, self.entry.refresh_moves - self.moves % self.entry.refresh_moves)
             yield self._run(most, last_episode - self.episodes)
 
     def _run(self, max_moves: int, max_episodes: int) -> Episodes:
@@ -148,6 +150,8 @@ class Training:
         run(self.task.kernel, self.learner, self.memory, self._log, max_moves, max_episodes)
         ended = _take(self._log)
         self._make_room()
+        if self.entry.refresh_moves and self.moves % self.entry.refresh_moves == 0:
+            catalog.refresh(self.learner_id, self.task, self.settings, self.memory)
         return ended
 
     def _make_room(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,8 +16,13 @@ from tools.document import make_document, print_document
 from tools.options import parse_options
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from hose_mj.checks import Check
     from learning.components.relevance import Relevance
+
+WIDEST = 6
+"""Most signals that stand side by side."""
 
 
 @dataclass(frozen=True)
@@ -108,32 +114,62 @@ def _list(found: list[Relevance]) -> dict[str, Any]:
                 "seen": int(first.n_seen[place]),
                 "relevant": first.list_relevant(signal),
                 "share_of_logs": dict(zip(first.variables, share[:, place], strict=True)),
+                "most_common": _find_most_common(found, place),
             }
             for place, signal in enumerate(first.signals)
         ],
     }
 
 
+def _find_most_common(found: list[Relevance], place: int) -> dict[str, Any]:
+    """The variables that most logs agree on for a signal, and how many do."""
+    signal = found[0].signals[place]
+    sets = Counter(each.list_relevant(signal) for each in found)
+    relevant, logs = sets.most_common(1)[0]
+    return {"relevant": relevant, "logs": logs}
+
+
 def _print(found: list[Relevance], checks: list[Check], title: str) -> None:
-    """Prints variables by signals: a checkmark, or the share of logs in which one matters."""
+    """Prints variables by signals, or a row for each signal where there are many."""
     from rich.console import Console
+
+    first = found[0]
+    wide = len(first.signals) > WIDEST
+    title += f", {len(found)} logs" if len(found) > 1 else ""
+    Console().print(_make_list(first, title) if wide else _make_matrix(found, title))
+    for place, signal in enumerate(first.signals if len(found) > 1 else ()):
+        most = _find_most_common(found, place)
+        print(f"{signal.name}: {', '.join(most['relevant'])} in {most['logs']} of {len(found)}")
+    print_checks(checks)
+
+
+def _make_matrix(found: list[Relevance], title: str) -> Table:
+    """Variables by signals: a checkmark, or in how many logs one matters."""
     from rich.table import Table
 
     first = found[0]
-    table = Table(title=title + (f", {len(found)} logs" if len(found) > 1 else ""))
-    table.add_column("variable")
+    table = Table("variable", title=title)
     for signal in first.signals:
         table.add_column(signal.name, justify="center")
-    for row, variable in enumerate(first.variables):
-        counts = [
-            sum(int(each.relevant[row, k]) for each in found) for k in range(len(first.signals))
+    for place, variable in enumerate(first.variables):
+        row = [
+            sum(int(each.relevant[place, k]) for each in found) for k in range(len(first.signals))
         ]
         if len(found) == 1:
-            cells = ["✓" if count else "" for count in counts]
+            cells = ["✓" if count else "" for count in row]
         else:
-            cells = [f"{count} of {len(found)}" if count else "" for count in counts]
+            cells = [f"{count} of {len(found)}" if count else "" for count in row]
         table.add_row(variable, *cells)
     table.add_section()
     table.add_row("moves with it", *(f"{int(n):,}" for n in first.n_seen))
-    Console().print(table)
-    print_checks(checks)
+    return table
+
+
+def _make_list(first: Relevance, title: str) -> Table:
+    """What matters for each signal, in the first log."""
+    from rich.table import Table
+
+    table = Table("signal", "variables that matter", "moves with it", title=title)
+    for signal, n_seen in zip(first.signals, first.n_seen.tolist(), strict=True):
+        table.add_row(signal.name, ", ".join(first.list_relevant(signal)), f"{n_seen:,}")
+    return table

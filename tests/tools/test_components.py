@@ -40,6 +40,7 @@ def test_relevance(capsys):
     assert signal["name"] == signal["event"] == "collision"
     assert signal["relevant"] == ["o_up"]
     assert signal["share_of_logs"] == {"x": 0.0, "y": 0.0, "o_up": 1.0}
+    assert signal["most_common"] == {"relevant": ["o_up"], "logs": 1}
     assert 0 < signal["seen"] < 400
     assert [check["ok"] for check in document["checks"]] == [True]
     assert "1 of 1 checks ok" in err
@@ -48,6 +49,7 @@ def test_relevance(capsys):
 def test_relevance_after_too_few_moves_fails_its_check(capsys):
     status, out, _ = run(capsys, "relevance", "maze", "--moves", "3", "--logs", "4")
     assert status == cli.CHECK_FAILED
+    assert "collision: " in out
     assert "of 4" in out
     assert "0 of 1 checks ok" in out
 
@@ -59,6 +61,13 @@ def test_relevance_marks_what_matters(capsys):
     assert status == 0
     assert "✓" in rows["o_up"]
     assert "✓" not in rows["y"]
+
+
+def test_relevance_lists_many_signals(capsys):
+    words = ("line-single-agent", "--set", "n_robots=3", "--moves", "300", "--fresh", "10")
+    _, out, _ = run(capsys, "relevance", *words)
+    assert "variables that matter" in out
+    assert "stretch_2" in out
 
 
 def test_joint_policy(capsys, uncompiled):

@@ -81,7 +81,7 @@ def run(args: Args) -> int:
     checks = [
         Check(
             f"{signal.name}: moves of a fresh log that are not told",
-            count_unexplained(found[0], signal, fresh),
+            count_unexplained(found[0], signal, fresh, args.pooled),
             0,
             "==",
         )

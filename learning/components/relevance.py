@@ -209,10 +209,12 @@ def select_rows(
     return experience.values[rows][:, columns], moves[rows], happened[rows]
 
 
-def count_unexplained(relevance: Relevance, signal: Signal, experience: Experience) -> int:
+def count_unexplained(
+    relevance: Relevance, signal: Signal, experience: Experience, pooled: bool = False
+) -> int:
     """Counts moves of a log that a signal's relevant variables do not tell from others."""
     names = relevance.list_relevant(signal)
-    values, moves, happened = select_rows(experience, signal, names)
+    values, moves, happened = select_rows(experience, signal, names, pooled)
     return count_contradictions(np.column_stack([moves, values]), happened)
 
 

@@ -40,10 +40,17 @@ COMMANDS = {
     ),
     "consensus": Command("tools.consensus", "let agents agree on whose turn it is, by messages"),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
+    "joint-policy": Command(
+        "tools.joint_policy", "compose what agents learned in turns into joint moves"
+    ),
+    "relevance": Command(
+        "tools.relevance", "find the state variables that matter for each constraint"
+    ),
     "reproduce": Command(
         "tools.reproduce", "repeat the thesis's experiments over seeds, beside its numbers"
     ),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
+    "transfer": Command("tools.transfer", "start on a task from what was learned on a simpler one"),
 }
 
 

@@ -29,6 +29,7 @@ COMMANDS = {
     "compare": Command(
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
+    "curves": Command("tools.learning_curves", "draw how learners get better as they train"),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
 }

@@ -1,0 +1,1 @@
+"""What learners are made of beside tables and rules; each part has a command of its own."""

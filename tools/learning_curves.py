@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,28 +17,39 @@ from hose_mj.recording.files import write_atomically
 from hose_mj.recording.plot_learning import Curve, Panel, plot_learning
 from hose_mj.tasks.task import Task
 from learning.learners import catalog
-from learning.study.statistics import compute_mean_interval
 from learning.study.training import Episodes
 from tools import train
 from tools.document import make_document, print_document
 from tools.progress import show_progress
 
 Measured = npt.NDArray[np.float64]
-MEASURES: dict[str, tuple[str, Callable[[Task, Episodes], npt.NDArray[Any]]]] = {
-    "success": ("episodes that reach the goal", lambda task, e: e.find_successes(task)),
-    "moves": ("moves per episode", lambda task, e: e.moves),
-    "return": ("rewards per episode", lambda task, e: e.returns),
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is drawn: its words, its axis, and its value for each of some episodes."""
+
+    words: str
+    scale: Literal["share", "log", "linear"]
+    compute: Callable[[Task, Episodes], npt.NDArray[Any]]
+
+
+MEASURES = {
+    "success": Measure(
+        "episodes that reach the goal", "share", lambda task, ended: ended.find_successes(task)
+    ),
+    "moves": Measure("moves per episode", "log", lambda task, ended: ended.moves),
+    "return": Measure("rewards per episode", "linear", lambda task, ended: ended.returns),
 }
-"""Name to its words in the picture, and its value for each episode."""
 
 
 @dataclass(frozen=True)
 class Args:
     """Train learners on a task with several seeds and draw what their training episodes came to.
 
-    A line is the mean over the seeds, in bins of as many episodes each; the band around it is the
-    95 % interval of that mean (Student's t). All learners get the same seeds and settings; options
-    that are not given are those of `hose-mj train`.
+    A line is the mean over the seeds, in bins of as many episodes each; the band around it goes
+    from the lowest seed to the highest. All learners get the same seeds and settings; options that
+    are not given are those of `hose-mj train`.
     """
 
     task: Annotated[str, tyro.conf.Positional] = "line"
@@ -90,7 +101,7 @@ def run(args: Args) -> int:
                 show(1)
     x = args.episodes / args.bins * np.arange(1, args.bins + 1)
     panels = [make_panel(name, x, measured) for name in args.measures]
-    title = args.title or " ".join([args.task, *args.set])
+    title = args.title or ", ".join([args.task, *args.set])
     write_atomically(args.out, plot_learning(title, "episodes", panels))
     results = {"picture": str(args.out), "curves": list_records(args.measures, panels)}
     if args.json:
@@ -129,23 +140,19 @@ def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     with compile_notice("learner's kernels"):
         training.advance(moves=0)
     ended = training.advance(episodes=args.episodes)
-    values = (MEASURES[name][1](training.task, ended) for name in args.measures)
+    values = (MEASURES[name].compute(training.task, ended) for name in args.measures)
     parts = (np.array_split(np.asarray(value, float), args.bins) for value in values)
     means = (np.array([part.mean() for part in split]) for split in parts)
     return dict(zip(args.measures, means, strict=True))
 
 
 def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measured]]]) -> Panel:
-    """Makes the panel of one measure: means over the seeds and their intervals."""
-    is_share = name == "success"
+    """Makes the panel of one measure: means over the seeds, from the lowest to the highest."""
     curves = {}
     for learner, runs in measured.items():
         values = np.stack([run[name] for run in runs])  # (seeds, bins)
-        low, high = np.array([compute_mean_interval(column) for column in values.T]).T
-        if is_share:
-            low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
-        curves[learner] = Curve(x, values.mean(axis=0), low, high)
-    return Panel(MEASURES[name][0], curves, is_share)
+        curves[learner] = Curve(x, values.mean(axis=0), values.min(axis=0), values.max(axis=0))
+    return Panel(MEASURES[name].words, curves, MEASURES[name].scale)
 
 
 def list_records(measures: Sequence[str], panels: Sequence[Panel]) -> list[dict[str, Any]]:

@@ -1,9 +1,10 @@
-"""Learning curves: a mean over seeds with its interval, one panel for each measure."""
+"""Learning curves: a mean over seeds in a band, one panel for each measure."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.recording.plot_labels import label_line_ends
-from hose_mj.recording.plot_parts import check_some
-from hose_mj.recording.plot_style import choose_looks, encode_png, make_figure
+from hose_mj.recording.plot_parts import check_some, set_log
+from hose_mj.recording.plot_style import DASHES, choose_looks, encode_png, make_figure
 
 PANEL = (4.6, 3.5)
 """Width and height of a panel (inches)."""
@@ -42,16 +43,18 @@ class Panel:
     Attributes:
         name: of the measure, with its unit.
         curves: by label; the same labels in all panels.
-        is_share: whether the measure goes from 0 to 1.
+        scale: "share" from 0 to 1, "log" or "linear".
     """
 
     name: str
     curves: Mapping[str, Curve]
-    is_share: bool = False
+    scale: Literal["share", "log", "linear"] = "linear"
 
 
 def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:
     """Draws panels side by side; each line's name stands at its end, in the last panel.
+
+    Each line has dashes of its own, so that one shows through another that lies over it.
 
     Raises:
         InputError: no panel, one without curves, or arrays of different lengths.
@@ -65,11 +68,11 @@ def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:
         rows = np.atleast_1d(figure.subplots(1, len(panels)))
         ends = []
         for axes, panel in zip(rows, panels, strict=True):
-            for label, curve in panel.curves.items():
+            for place, (label, curve) in enumerate(panel.curves.items()):
                 x, middle, low, high = _check_curve(label, curve)
                 look = looks[label]
                 axes.fill_between(x, low, high, color=look.color, alpha=0.18, lw=0.0)
-                axes.plot(x, middle, color=look.color, ls=look.dashes)
+                axes.plot(x, middle, color=look.color, ls=DASHES[place % len(DASHES)])
                 if axes is rows[-1] and len(middle):
                     ends.append((float(middle[-1]), label, look.ink))
             _set_axes(axes, xlabel, panel)
@@ -81,9 +84,12 @@ def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:
 def _set_axes(axes: Axes, xlabel: str, panel: Panel) -> None:
     axes.set_xlabel(xlabel)
     axes.set_ylabel(panel.name)
-    axes.set_xlim(left=0.0)
+    axes.set_xlim(0.0, max(float(np.max(curve.x)) for curve in panel.curves.values()))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    if panel.is_share:
+    if panel.scale == "log":
+        set_log(axes, x=False, y=True)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+    elif panel.scale == "share":
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
 

@@ -39,6 +39,7 @@ COMMANDS = {
         "tools.compare", "measure the hose models against closed forms, or on your own hose"
     ),
     "consensus": Command("tools.consensus", "let agents agree on whose turn it is, by messages"),
+    "curves": Command("tools.learning_curves", "draw how learners get better as they train"),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
     "joint-policy": Command(
         "tools.joint_policy", "compose what agents learned in turns into joint moves"

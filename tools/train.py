@@ -118,17 +118,26 @@ def _check(args: Args) -> None:
             raise InputError(name, getattr(args, name), "one of " + ", ".join(choices))
 
 
-def _begin(args: Args) -> tuple[RunFolder, Training, int, Args]:
+def make_training(args: Args) -> Training:
+    """Makes the training that the arguments describe, before its first move.
+
+    Raises:
+        InputError: an unknown task or learner, or a setting that it does not allow.
+    """
     task = make_task(args.task, **parse_options(args.set))
     id = args.learner or ("thresholded-msav" if args.task.startswith("line") else "d-rr-ql")
     catalog.find_learner(id)
     settings = catalog.make_settings(
         id, task, args.values, args.vetoes, exploration=_explore(args, task), **_given(args)
     )
-    training = Training(task, id, settings, np.random.default_rng(args.seed))
-    name = f"{task.id}-{id}-seed{args.seed}"
+    return Training(task, id, settings, np.random.default_rng(args.seed))
+
+
+def _begin(args: Args) -> tuple[RunFolder, Training, int, Args]:
+    training = make_training(args)
+    name = f"{training.task.id}-{training.learner_id}-seed{args.seed}"
     folder = RunFolder(args.out or find_free(Path("out") / "train" / name))
-    args = replace(args, episodes=_count_episodes(args, task))
+    args = replace(args, episodes=_count_episodes(args, training.task))
     folder.create(training, args.seed, {"episodes": args.episodes, "moves": args.moves})
     return folder, training, args.seed, args
 

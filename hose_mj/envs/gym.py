@@ -58,7 +58,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self.episode = Episode(self.task, rewards)
         self.render_mode = render_mode
         self._renderer = Renderer(self.task, render_mode)
-        self._at_once = check_moves(moves)
+        self.at_once = check_moves(moves)
         self._view = View(self.task, observe, form, range(self.task.n_agents))
         self.observation_space = self._view.make_space()
         self.action_space = make_action_space(self.task)
@@ -89,7 +89,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             InputError: an action out of range, or an episode that is over.
         """
         episode = self.episode
-        episode.play_all(split_action(self.task, action), self._at_once)
+        episode.play_all(split_action(self.task, action), self.at_once)
         reward = float(sum_signals(episode.compute_team_signals(), episode.chosen))
         self._renderer.follow(episode)
         return self._observe(), reward, episode.terminated, episode.truncated, self._make_info()

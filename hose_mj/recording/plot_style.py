@@ -49,7 +49,8 @@ STYLE: dict[str, Any] = {
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }
-_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+"""Dash patterns that tell lines apart."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def choose_looks(labels: Sequence[str]) -> dict[str, Look]:
         count = seen.get(model, 0)
         seen[model] = count + 1
         color = find_color(label, count)
-        dashes = "-" if model is None else _DASHES[count % len(_DASHES)]
+        dashes = "-" if model is None else DASHES[count % len(DASHES)]
         looks[label] = Look(
             format_hex(color), format_hex(darken(color)), MARKERS.get(model or "", "."), dashes
         )

@@ -1,0 +1,171 @@
+"""`hose-mj curves`: how learners get better at a task, as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import tyro
+
+from hose_mj.compiled import compile_notice
+from hose_mj.errors import InputError
+from hose_mj.recording.files import write_atomically
+from hose_mj.recording.plot_learning import Curve, Panel, plot_learning
+from hose_mj.tasks.task import Task
+from learning.learners import catalog
+from learning.study.training import Episodes
+from tools import train
+from tools.document import make_document, print_document
+from tools.progress import show_progress
+
+Measured = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is drawn: its words, its axis, and its value for each of some episodes."""
+
+    words: str
+    scale: Literal["share", "log", "linear"]
+    compute: Callable[[Task, Episodes], npt.NDArray[Any]]
+
+
+MEASURES = {
+    "success": Measure(
+        "episodes that reach the goal", "share", lambda task, ended: ended.find_successes(task)
+    ),
+    "moves": Measure("moves per episode", "log", lambda task, ended: ended.moves),
+    "return": Measure("rewards per episode", "linear", lambda task, ended: ended.returns),
+}
+
+
+@dataclass(frozen=True)
+class Args:
+    """Train learners on a task with several seeds and draw what their training episodes came to.
+
+    A line is the mean over the seeds, in bins of as many episodes each; the band around it goes
+    from the lowest seed to the highest. All learners get the same seeds and settings; options that
+    are not given are those of `hose-mj train`.
+    """
+
+    task: Annotated[str, tyro.conf.Positional] = "line"
+    """A task (hose-mj train --list names all)."""
+    learners: tuple[str, ...] = ("d-rr-ql",)
+    """The learners to compare."""
+    measures: tuple[str, ...] = ("success",)
+    """What to draw, a panel each: success, moves, return."""
+    set: tuple[str, ...] = ()
+    """Options of the task, as n_robots=3 goal=(2,1)."""
+    episodes: int = 2_000
+    """Episodes of each training."""
+    bins: int = 50
+    """Points of each line."""
+    seeds: int = 5
+    """Trainings of each learner."""
+    epsilon: float | None = None
+    """Share of random choices at the start."""
+    epsilon_per_episode: float | None = None
+    """What epsilon falls by after each episode."""
+    epsilon_per_success: float | None = None
+    """What epsilon falls by after each success."""
+    learning_rate: float | None = None
+    """Alpha."""
+    discount: float | None = None
+    """Gamma."""
+    values: str | None = None
+    """What the value modules see, of all learners: goal or monolithic."""
+    vetoes: str | None = None
+    """What vetoes, for all learners: none, modules, monolithic, thresholds or values."""
+    title: str | None = None
+    """Above the picture; by default the task and its options."""
+    out: Path = Path("out/curves.png")
+    """The picture."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """The first seed; the others follow it."""
+
+
+def run(args: Args) -> int:
+    """Trains and draws; 0 when done."""
+    check_arguments(args)
+    measured: dict[str, list[dict[str, Measured]]] = {id: [] for id in args.learners}
+    with show_progress(f"{args.task}", args.seeds * len(args.learners)) as show:
+        for id, runs in measured.items():
+            for seed in range(args.seed, args.seed + args.seeds):
+                runs.append(measure(args, id, seed))
+                show(1)
+    x = args.episodes / args.bins * np.arange(1, args.bins + 1)
+    panels = [make_panel(name, x, measured) for name in args.measures]
+    title = args.title or ", ".join([args.task, *args.set])
+    write_atomically(args.out, plot_learning(title, "episodes", panels))
+    results = {"picture": str(args.out), "curves": list_records(args.measures, panels)}
+    if args.json:
+        print_document(make_document("curves", args, seed=args.seed, results=results))
+    else:
+        for record in results["curves"]:
+            last = "nothing" if record["mean"][-1] is None else f"{record['mean'][-1]:.3g}"
+            print(f"{record['learner']}: {record['measure']} {last} in the last bin")
+        print(f"picture: {args.out}")
+    return 0
+
+
+def check_arguments(args: Args) -> None:
+    """Raises `InputError` for a number or a name outside its valid set."""
+    for name in ("episodes", "bins", "seeds"):
+        if getattr(args, name) < 1:
+            raise InputError(name, getattr(args, name), "a whole number, at least 1")
+    if args.bins > args.episodes:
+        raise InputError("bins", args.bins, f"at most one for each of {args.episodes} episodes")
+    if args.seed < 0:
+        raise InputError("seed", args.seed, "a whole number, at least 0")
+    for name, given, known in (
+        ("learners", args.learners, list(catalog.LEARNERS)),
+        ("measures", args.measures, list(MEASURES)),
+    ):
+        valid = "different names out of " + ", ".join(known)
+        if not given or len(set(given)) < len(given) or not set(given) <= set(known):
+            raise InputError(name, given, valid)
+
+
+def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
+    """Trains once; returns the mean of each measure in each bin (bins,)."""
+    shared = {field.name for field in fields(train.Args)} & {field.name for field in fields(Args)}
+    given = {name: getattr(args, name) for name in shared - {"out", "json", "seed"}}
+    training = train.make_training(train.Args(**given, learner=learner, seed=seed))
+    with compile_notice("learner's kernels"):
+        training.advance(moves=0)
+    ended = training.advance(episodes=args.episodes)
+    values = (MEASURES[name].compute(training.task, ended) for name in args.measures)
+    parts = (np.array_split(np.asarray(value, float), args.bins) for value in values)
+    means = (np.array([part.mean() for part in split]) for split in parts)
+    return dict(zip(args.measures, means, strict=True))
+
+
+def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measured]]]) -> Panel:
+    """Makes the panel of one measure: means over the seeds, from the lowest to the highest."""
+    curves = {}
+    for learner, runs in measured.items():
+        values = np.stack([run[name] for run in runs])  # (seeds, bins)
+        curves[learner] = Curve(x, values.mean(axis=0), values.min(axis=0), values.max(axis=0))
+    return Panel(MEASURES[name].words, curves, MEASURES[name].scale)
+
+
+def list_records(measures: Sequence[str], panels: Sequence[Panel]) -> list[dict[str, Any]]:
+    """Lists what was drawn as plain values, one record for each line."""
+    return [
+        {
+            "measure": name,
+            "learner": learner,
+            "episodes": np.asarray(curve.x).tolist(),
+            "mean": np.asarray(curve.middle).tolist(),
+            "low": np.asarray(curve.low).tolist(),
+            "high": np.asarray(curve.high).tolist(),
+        }
+        for name, panel in zip(measures, panels, strict=True)
+        for learner, curve in panel.curves.items()
+    ]

@@ -12,8 +12,8 @@ from learning.settings import Exploration
 from learning.study import run_folder
 from learning.study.training import Training
 from tools import cli, train
-from tools.task_options import parse_options
 from tools.progress import defer_interrupt, show_progress
+from tools.task_options import parse_options
 
 MAZE = ("train", "maze", "--learner", "q-learning", "--tests", "20", "--episodes", "200")
 

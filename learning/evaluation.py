@@ -65,9 +65,9 @@ def compose(task, learner, memory, start):  # type: ignore[no-untyped-def]
     """Writes the joint move that the agents agree on, one after the other (section 6.4).
 
     Agent i chooses greedily in the state that its predecessors expect to hand on. In a
-    deterministic task an estimated transition is what was seen, so it is played on a copy of the
-    state. What an agent has no value for it has not learned: then it hands the state on unchanged,
-    as where a terminal state is expected.
+    deterministic task an estimated transition is what was seen, so here it is played on a copy of
+    the state, as if everything had been seen once; `learning.components.joint_policy` has the
+    estimates. Where a terminal state is expected nobody moves any more.
 
     Args:
         task: the task's kernel record.

@@ -10,8 +10,9 @@ from hose_mj.errors import InputError
 from hose_mj.tasks.task import Task
 from learning.modules import Module
 
-VALUES = ("goal", "monolithic")
-"""A module for the goal's reward alone, or one for all rewards that sees the whole state."""
+VALUES = ("goal", "local", "monolithic")
+"""A module for the goal's reward alone, such a one that sees only what is near the agent, or one
+for all rewards that sees the whole state."""
 VETOES = ("none", "modules", "monolithic", "thresholds", "values")
 """No vetoes; a boolean module for each constraint (section 5.3); one on the whole state; a value
 module for each with a threshold (section 4.5); such modules without a threshold (Algorithm 4.1)."""
@@ -45,12 +46,14 @@ class Parts:
     Attributes:
         state: variables that together are the whole state, as far as it matters.
         goal: variables that the goal module sees.
+        local: those that it sees of what is near the agent.
         signals: reward signals of the goal.
         constraints: those of the task.
     """
 
     state: tuple[str, ...]
     goal: tuple[str, ...]
+    local: tuple[str, ...]
     signals: tuple[str, ...]
     constraints: tuple[Constraint, ...]
 
@@ -82,7 +85,8 @@ def make_modules(
     if values == "monolithic":
         goal = Module(name="monolithic", variables=parts.state, signals=task.rewards)
     else:
-        goal = Module(name="goal", variables=parts.goal, signals=parts.signals)
+        seen = parts.local if values == "local" else parts.goal
+        goal = Module(name="goal", variables=seen, signals=parts.signals)
     return (goal, *_make_constraint_modules(parts, vetoes, threshold))
 
 
@@ -112,6 +116,7 @@ def _make_constraint_modules(parts: Parts, vetoes: str, threshold: float) -> Seq
 def _find_line(task: Task) -> Parts:
     """Chapters 4 to 7: the formation where the goal is fixed, else the goal's place (d_g, theta_g).
 
+    Near an agent are its cell, or where the goal moves the way there, and both neighbours.
     Distances, collisions and the grid are constraints of each robot by itself.
     """
     settings = task.settings
@@ -120,9 +125,12 @@ def _find_line(task: Task) -> Parts:
     robots = range(settings.n_robots) if settings.single_agent else [None]
     constraints = [c for robot in robots for c in _find_line_constraints(task, robot)]
     seen_goal = ("d_g_0", "theta_g_0") if settings.single_agent else ("d_g", "theta_g")
+    goal = formation if is_fixed else seen_goal
+    near = ("p" if is_fixed else "r_g", "r_n", "r_p")
     return Parts(
         state=formation if is_fixed else ("goal", *formation),
-        goal=formation if is_fixed else seen_goal,
+        goal=goal,
+        local=goal if settings.single_agent else near,
         signals=("goal",),
         constraints=tuple(constraints),
     )
@@ -153,21 +161,21 @@ def _find_taxi(task: Task) -> Parts:
             tail = event.removeprefix("collision")
             flags = tuple(f"o_{way}{tail}" for way in ("up", "down", "left", "right"))
             constraints.append(Constraint(f"flags{tail}", flags, (event,), ("collision",)))
-    return Parts(state, state, ("goal",), tuple(constraints))
+    return Parts(state, state, state, ("goal",), tuple(constraints))
 
 
 def _find_corridor(task: Task) -> Parts:
     """Example 1: both robots' cells say everything."""
     state = ("p_0", "p_1")
     collision = Constraint("collisions", state, ("collision",), ("collision",))
-    return Parts(state, state, ("goal",), (collision,))
+    return Parts(state, state, state, ("goal",), (collision,))
 
 
 def _find_maze(task: Task) -> Parts:
     """Table 5.1: where the robot is; its flags tell walls."""
     flags = tuple(v.name for v in task.variables if v.name.startswith("o_"))
     collision = Constraint("walls", flags, ("collision",), ("collision",))
-    return Parts(("x", "y"), ("x", "y"), ("goal",), (collision,))
+    return Parts(("x", "y"), ("x", "y"), ("x", "y"), ("goal",), (collision,))
 
 
 def _find_any(task: Task) -> Parts:
@@ -178,7 +186,7 @@ def _find_any(task: Task) -> Parts:
     constraints = tuple(
         Constraint(name, state, (name,), (name,) if name in task.rewards else ()) for name in breaks
     )
-    return Parts(state, state, goal, constraints)
+    return Parts(state, state, state, goal, constraints)
 
 
 PARTS: dict[str, Callable[[Any], Parts]] = {

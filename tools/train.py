@@ -65,7 +65,7 @@ class Args:
     discount: float | None = None
     """Gamma."""
     values: str | None = None
-    """What the value modules see: goal or monolithic; the default depends on the learner."""
+    """What the value modules see: goal, local or monolithic; the default depends on the learner."""
     vetoes: str | None = None
     """What vetoes: none, modules, monolithic, thresholds or values; likewise."""
     tests: int = 200

@@ -165,10 +165,13 @@ def _summarize(steps: Sequence[float]) -> tuple[float, tuple[float, float]]:
 
 N_CONFIGURATIONS = 30
 _TEAMS: dict[str, tuple[str, dict[str, Any]]] = {
-    "d-rr-ql": ("d-rr-ql", {"learning_rate": 0.25}),
-    "d-ql": ("d-ql", {}),
-    "d-ql, kept policy": ("d-ql", {"options": {"keeps_policy": "yes"}}),
+    "d-rr-ql": ("d-rr-ql", {"values": "local"}),
+    "d-ql": ("d-ql", {"values": "local", "options": {"keeps_policy": "yes"}}),
+    "d-rr-ql that sees the formation": ("d-rr-ql", {}),
+    "d-ql that sees the formation": ("d-ql", {"options": {"keeps_policy": "yes"}}),
 }
+"""Goal modules that see their agent's cell and neighbours learn more than those that see everybody,
+and D-QL more where it keeps its policy."""
 
 
 def make_configuration(number: int) -> dict[str, Any]:
@@ -293,7 +296,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "table-6.3": Experiment(
         "random configurations: goals found and policies composed",
         "starts uniform over the feasible ones, goals over the grid; 1e7 steps; epsilon - .001 for "
-        "each goal",
+        "each goal; the goal modules see an agent's cell and neighbours, the text leaves it open",
         _list_table,
         _conclude_table,
     ),

@@ -243,12 +243,10 @@ def test_a_run_is_not_overwritten(call, tmp_path, monkeypatch):
         ("a=3", 3),
         ("a=0.5", 0.5),
         ("a=(2,1)", (2, 1)),
-        ("a=[1, 2]", (1, 2)),
         ("a=random", "random"),
         ("a=True", True),
         ("a=x=y", "x=y"),
         ("a=", ""),
-        ("a={[]: 1}", "{[]: 1}"),
     ],
 )
 def test_options_are_python_literals_or_words(word, value):

@@ -105,6 +105,7 @@ def test_an_identity_changes_with_any_setting():
     base = saving.describe(training, 3)
     identities = {saving.compute_identity(base)}
     assert identities == {saving.compute_identity(pass_through_json(base))}
+    assert identities == {saving.compute_identity(dict(reversed(base.items())))}
     others = [saving.describe(make(step_limit=99), 3), saving.describe(training, 4)]
     others.append({**base, "learner": "safe-msav"})
     for change in CHANGES:

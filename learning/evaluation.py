@@ -12,7 +12,6 @@ from hose_mj.tasks.kernels import STEPS, TURN
 from learning import rules
 from learning.loop import begin_episode, choose, see
 from learning.records import Memory
-from learning.tables import find
 
 
 def make_probe(memory: Memory) -> Memory:
@@ -51,16 +50,6 @@ def play_joint(task, learner, memory):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def has_value(learner, memory, agent, action):  # type: ignore[no-untyped-def]
-    """Whether any of the agent's modules has learned something of the action."""
-    for module in range(learner.bases.shape[0]):
-        row = find(memory.table, memory.keys[agent, module])
-        if memory.table.rows[row, action] != 0.0:
-            return True
-    return False
-
-
-@jitable
 def compose(task, learner, memory, start):  # type: ignore[no-untyped-def]
     """Writes the joint move that the agents agree on, one after the other (section 6.4).
 
@@ -87,7 +76,7 @@ def compose(task, learner, memory, start):  # type: ignore[no-untyped-def]
         allowed = see(task, learner, memory, agent)
         action = choose(task, learner, memory, agent, allowed, False)
         memory.actions[agent] = action
-        if not is_over and has_value(learner, memory, agent, action):
+        if not is_over:
             state[TURN] = agent
             is_over = kernels.is_over(task, kernels.apply(task, state, agent, action))
     for k in range(state.shape[0]):

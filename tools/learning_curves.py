@@ -99,11 +99,14 @@ def run(args: Args) -> int:
             for seed in range(args.seed, args.seed + args.seeds):
                 runs.append(measure(args, id, seed))
                 show(1)
-    x = args.episodes / args.bins * np.arange(1, args.bins + 1)
+    x = np.arange(1, args.bins + 1, dtype=np.float64) * (args.episodes / args.bins)
     panels = [make_panel(name, x, measured) for name in args.measures]
     title = args.title or ", ".join([args.task, *args.set])
     write_atomically(args.out, plot_learning(title, "episodes", panels))
-    results = {"picture": str(args.out), "curves": list_records(args.measures, panels)}
+    results: dict[str, Any] = {
+        "picture": str(args.out),
+        "curves": list_records(args.measures, panels),
+    }
     if args.json:
         print_document(make_document("curves", args, seed=args.seed, results=results))
     else:

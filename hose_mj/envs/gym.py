@@ -37,6 +37,10 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         render_mode: one of `RENDER_MODES`, or None.
         options: options of the task.
 
+    Attributes:
+        task, episode: what is played.
+        at_once: whether all agents move at once, and not each in its turn.
+
     Raises:
         InputError: an unknown task, option or name, or a value outside its valid set.
     """

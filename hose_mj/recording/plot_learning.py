@@ -91,7 +91,7 @@ def _set_axes(axes: Axes, xlabel: str, panel: Panel) -> None:
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
     elif panel.scale == "share":
         axes.set_ylim(-0.02, 1.02)
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
 
 
 def _check_curve(label: str, curve: Curve) -> list[np.ndarray[tuple[int], np.dtype[np.float64]]]:

@@ -16,8 +16,11 @@ from hose_mj.envs.turns import TurnsEnv
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import enumerate_turns
+from hose_mj.tasks.kernels import HEADER
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
+from hose_mj.tasks.task import Task
+from hose_mj.tasks.variables import Variable
 from learning.components.mask_kernels import find_unvetoed
 from learning.components.masks import MaskedEnv, VetoMasks
 from learning.components.shared_policy import SharedPolicyEnv
@@ -25,11 +28,63 @@ from learning.learners import catalog
 from learning.study.training import Training
 from learning.tables import FIRST_CAPACITY, LARGEST_LOAD
 
+
+class Ledge:
+    """A plain Python task: three places, a fall at both ends; nobody may wait at the left one."""
+
+    n_agents, n_actions, step_limit = 1, 3, 50
+    terminal = violations = 1
+    success = shared = 0
+    reward_table = np.array([[0.0], [-1.0]])
+
+
+@kernels.reset.register
+def reset_ledge(record: Ledge, state, stream):
+    kernels.begin(state)
+    state[HEADER] = 0
+
+
+@kernels.apply.register
+def apply_ledge(record: Ledge, state, agent, action):
+    state[HEADER] += (-1, 1, 0)[action]
+    kernels.end_turn(record, state, agent)
+    return int(not 0 <= state[HEADER] <= 2)
+
+
+@kernels.apply_joint.register
+def apply_joint_ledge(record: Ledge, state, actions, charged):
+    charged[0] = apply_ledge(record, state, 0, actions[0])
+    return int(charged[0])
+
+
+@kernels.observe.register
+def observe_ledge(record: Ledge, state, agent, values):
+    values[0] = np.clip(state[HEADER], 0, 2)
+
+
+@kernels.mask.register
+def mask_ledge(record: Ledge, state, agent):
+    return 0b011 if state[HEADER] == 0 else 0b111
+
+
+LEDGE = Task(
+    id="ledge",
+    agents=("walker",),
+    action_names=("left", "right", "wait"),
+    variables=(Variable("place", 3, "where it stands"),),
+    rewards=("fall",),
+    events=("fall",),
+    schedule="single",
+    settings=None,
+    kernel=Ledge(),
+    layout={"place": slice(HEADER, HEADER + 1)},
+    state_size=HEADER + 1,
+)
 SB3 = "sb3-contrib is not installed: it comes with the extra deep"
 
 
 def make_training(id, learner="safe-msav", moves=0, **options):
-    task = make_task(id)
+    task = LEDGE if id == "ledge" else make_task(id)
     settings = catalog.make_settings(learner, task, **options)
     training = Training(task, learner, settings, np.random.default_rng(0), compiled=False)
     if moves:
@@ -138,6 +193,18 @@ def test_a_constraint_is_broken_once_and_never_again():
     for state in list_states(task):
         mask = env.masks.compute_mask(state, 0)
         np.testing.assert_array_equal(mask, find_safe(task, state))
+
+
+def test_a_task_in_plain_python_learns_too():
+    training = make_training("ledge", values="monolithic", vetoes="modules")
+    env = MaskedEnv(TaskEnv(LEDGE), VetoMasks(training), learns=True)
+    env.reset(seed=0)
+    assert env.action_masks().tolist() == [True, True, False]  # what the task says
+    env.step(0)
+    env.reset()
+    assert env.action_masks().tolist() == [False, True, False]  # and what was learned
+    env.step(1)
+    assert env.action_masks().tolist() == [True, True, True]
 
 
 def test_what_is_learned_here_does_not_reach_the_training():

@@ -22,6 +22,7 @@ from hose_mj.hoses.geds.solver import (
     add_mass,
     build,
     make_work,
+    multiply_row,
     newton,
     solve_with_holds,
 )
@@ -219,12 +220,13 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
     for half in range(2):
         # First half: lambda such that x_(n+1) meets the holds. Second: such that v_(n+1) does.
         for row in range(len(holds.start)):
-            gap = holds.after[row] if half == 0 else (holds.after[row] - holds.before[row]) / dt
-            for k in range(width):
-                at = holds.start[row] + k
-                aim = work.X[at] + dt * work.V[at] if half == 0 else work.V[at]
-                gap -= holds.rows[row, k] * aim
-            work.shift[row] = 2.0 * gap / (dt * dt if half == 0 else dt)
+            speed = multiply_row(axes, holds, row, work.V, size)
+            if half == 0:
+                gap = holds.after[row] - multiply_row(axes, holds, row, work.X, size)
+                work.shift[row] = 2.0 * (gap - dt * speed) / (dt * dt)
+            else:
+                wanted = (holds.after[row] - holds.before[row]) / dt
+                work.shift[row] = 2.0 * (wanted - speed) / dt
         # A stage of infinite length has no inertia: what it builds is the force.
         infinite = (np.inf, work.X, work.V)
         build(axes, hose, infinite, holds.twist, 1.0, loads, 1.0, True, work.X, work)

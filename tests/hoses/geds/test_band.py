@@ -89,7 +89,7 @@ def make_holds(d, seed=0, with_twist=False):
 
 def stack(holds, size):
     """Rows (m, size) of holds and twist, and the diagonal D (m,) that belongs to them."""
-    rows = mechanics.make_dense_rows(holds, size)
+    rows = mechanics.make_dense_rows(holds, size, holds.rows.shape[1])
     twist = holds.twist
     softness = np.concatenate([np.zeros(len(rows)), 0.5 * twist.compliance])
     return np.concatenate([rows, twist.rows[:, :size]]), softness

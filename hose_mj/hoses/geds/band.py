@@ -84,7 +84,8 @@ def solve_lower(axes, size, band, rows):  # type: ignore[no-untyped-def]
 
     The rows advance together, so that the processor need not wait for the end of each.
     """
-    width = 4 * len(axes)
+    # As long as 4 d but not known to the compiler, which would write the loop out number by number.
+    width = band.shape[1] // 2
     for j in range(size):
         inverse = band[j, 0]
         for row in range(rows.shape[0]):
@@ -98,10 +99,31 @@ def solve_lower(axes, size, band, rows):  # type: ignore[no-untyped-def]
 
 @kernel
 def solve_upper(axes, size, band, rhs):  # type: ignore[no-untyped-def]
-    """Solves L^T x = rhs in place; rhs (size + 4 d) vanishes after `size`."""
-    width = 4 * len(axes)
-    for j in range(size - 1, -1, -1):
-        value = 0.0
-        for k in range(width):
-            value += band[j, 1 + k] * rhs[j + 1 + k]
-        rhs[j] = (rhs[j] - value) * band[j, 0]
+    """Solves L^T x = rhs in place; rhs (size + 4 d) vanishes after `size`.
+
+    The d unknowns of a control point take what is known of the rest of the hose side by side.
+    """
+    d = len(axes)
+    for j in range(size - d, -1, -d):
+        s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+        for k in range(4 * d):
+            x = rhs[j + d + k]
+            s0 += band[j, d + k] * x
+            if d > 1:
+                s1 += band[j + 1, d - 1 + k] * x
+            if d > 2:
+                s2 += band[j + 2, d - 2 + k] * x
+            if d > 3:
+                s3 += band[j + 3, d - 3 + k] * x
+        x1, x2, x3 = 0.0, 0.0, 0.0
+        if d > 3:
+            x3 = (rhs[j + 3] - s3) * band[j + 3, 0]
+            rhs[j + 3] = x3
+        if d > 2:
+            x2 = (rhs[j + 2] - s2 - band[j + 2, 1] * x3) * band[j + 2, 0]
+            rhs[j + 2] = x2
+        if d > 1:
+            x1 = (rhs[j + 1] - s1 - band[j + 1, 1] * x2 - band[j + 1, 2] * x3) * band[j + 1, 0]
+            rhs[j + 1] = x1
+        s0 += band[j, 1] * x1 + band[j, 2] * x2 + band[j, 3] * x3
+        rhs[j] = (rhs[j] - s0) * band[j, 0]

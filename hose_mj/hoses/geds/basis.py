@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hose_mj.compiled import compiled
+from hose_mj.compiled import compiled, inlined
 from hose_mj.hoses.model import Array
 
 DEGREE = 3
@@ -28,10 +28,11 @@ class Tables(NamedTuple):
         first: basis derivatives dN/ds at the Gauss points, (S, 3, 4).
         second: d2N/ds2, (S, 3, 4).
         ends: dN/ds at the end of each span, (S, 4).
-        products: outer products of derivatives, of which a tangent stiffness is made, (S, 12, 16):
-            first x first at each Gauss point, first x second, second x first, second x second.
+        products: outer products of derivatives, of which a tangent stiffness is made: first x first
+            at each Gauss point, first x second, second x first, second x second, (7, 12, 16), for
+            each kind of span (`find_kind`).
         turn_products: the same for theta with the place, first x first, value x first, value x
-            second, and for theta with itself, first x first, value x value, (S, 15, 16).
+            second, and for theta with itself, first x first, value x value, (7, 15, 16).
         weights: Gauss weights that sum to 1, (3,).
         linear: sqrt(3) xi at the Gauss points, xi in [-1, 1]: the linear strain mode, (3,).
         gaps: distance of each Gauss point from the one before it, in span lengths, (3,).
@@ -100,6 +101,15 @@ def evaluate_basis(knots, arc_lengths, spans, values):  # type: ignore[no-untype
             values[k, 2, i] = _difference(knots, span, 3, i, before, after)
 
 
+@inlined
+def find_kind(n_spans, e):  # type: ignore[no-untyped-def]
+    """Kind of span e: the first three and the last three are one each, all between them a seventh.
+
+    Tables by kind stay in the processor's nearest memory however long the hose is.
+    """
+    return max(min(e, 3), e - n_spans + min(n_spans, 7))
+
+
 @compiled
 def _difference(knots, span, degree, i, before, after):  # type: ignore[no-untyped-def]
     """Derivative of N_(span + 3 - degree + i, degree) from its two neighbours of lower degree."""
@@ -130,13 +140,15 @@ def make_tables(knots: Array) -> Tables:
     value, first, second = (
         np.ascontiguousarray(values[:, k].reshape(n_spans, 3, 4)) for k in range(3)
     )
+    # One span of each kind; see `find_kind`.
+    of = [e for e in range(n_spans) if e < 4 or e >= n_spans - 3]
     return Tables(
         value,
         first,
         second,
         _compute_end_slopes(knots),
-        _multiply(first, first, first, second, second, first, second, second),
-        _multiply(first, first, value, first, value, second, first, first, value, value),
+        _multiply(first, first, first, second, second, first, second, second)[of],
+        _multiply(first, first, value, first, value, second, first, first, value, value)[of],
         weights / 2.0,
         np.sqrt(3.0) * nodes,
         np.array([1.0 - nodes[2], 0.5 * nodes[2], 0.5 * nodes[2]]),

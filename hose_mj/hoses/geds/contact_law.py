@@ -18,8 +18,8 @@ from hose_mj.compiled import kernel
 from hose_mj.hoses.geds.shapes import FRICTION, POSITION, SPIN, VELOCITY, is_near, measure
 from hose_mj.hoses.model import Array
 
-STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE, SELF_STIFFNESS, SELF_DAMPING = range(8)
-"""Places in `Contact.law`."""
+STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE, SELF_STIFFNESS, SELF_DAMPING, ROUND = range(9)
+"""Places in `Contact.law`; ROUND is the way round a closed loop (m), infinite in an open hose."""
 GIVEN = 11
 """Columns of a distance handed in: distance, normal (3), friction, surface velocity (3) and the
 place (3) of the contact point that it was measured at."""
@@ -34,7 +34,7 @@ class Contact(NamedTuple):
             (Q, 5), span after span, equally many in each.
         geoms: one row a shape, see shapes.py, (G, 25).
         given: distances handed in, one row a contact point, (Q, 11); (0, 11) for none.
-        law: numbers of the contact law, (8,); no self-contact where its stiffness is 0.
+        law: numbers of the contact law, (9,); no self-contact where its stiffness is 0.
         arcs: rest arc lengths of the contact points, (Q,), m.
         room: work space, (Q + S, 4).
     """

@@ -51,6 +51,7 @@ class ContactSet:
     def __init__(self, spline: Spline, spec: HoseSpec, gravity: Array, timestep: float) -> None:
         self._spline, self._spec, self._timestep = spline, spec, timestep
         self._pull = max(9.81, float(np.linalg.norm(gravity)))
+        self._is_closed = False
         # The hose's coordinates first: a reflection where that is an odd permutation.
         rest = [c for c in range(3) if c not in spline.dims]
         self.order = [*spline.dims, *rest]
@@ -103,6 +104,12 @@ class ContactSet:
         place = self._spline.evaluate(self.arc_lengths, x)
         given[:, 8:11] = place[:, self.order]
         self._given = given
+        self.rebuild()
+
+    def set_closed(self, is_closed: bool) -> None:
+        """Says whether the hose is a closed loop, whose ends do not touch each other."""
+        self._is_closed = is_closed
+        self._numbers = self._make_law()
         self.rebuild()
 
     def drop_distances(self) -> None:
@@ -200,7 +207,8 @@ class ContactSet:
         damping = law.damping_time
         if damping is None:
             damping = 2.0 * np.sqrt(spec.linear_density / k)
-        numbers = np.zeros(8)
+        numbers = np.zeros(9)
+        numbers[contact_law.ROUND] = self._spline.length if self._is_closed else np.inf
         numbers[contact_law.STIFFNESS] = k
         numbers[contact_law.WIDTH] = width
         numbers[contact_law.DAMPING] = damping

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.compiled import choose_by_unknowns, inlined, kernel
+from hose_mj.hoses.geds.basis import find_kind
 from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
 from hose_mj.hoses.geds.frames import move_clamp_frames
 from hose_mj.hoses.geds.frenet import add_frenet, compute_frenet_energy
@@ -67,7 +68,7 @@ def compute_energy(axes, tables, elasticity, frames, x, p, strains):  # type: ig
             half = 0.5 * tables.weights[g] * tables.span_length
             rest = elasticity.rest_curvature[e, g]
             if len(axes) == 4 and not elasticity.frenet:
-                first, second, twist = compute_rod_strains(frames, 3 * e + g, g, p)
+                first, second, twist, _ = compute_rod_strains(frames, 3 * e + g, g, p)
                 bending += half * elasticity.bending_stiffness[e, g] * (first - rest) ** 2
                 bending += half * elasticity.second_stiffness[e, g] * second**2
                 twist -= elasticity.rest_torsion[e, g]
@@ -107,6 +108,7 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
         _scatter_force(tables.first, tables.second, e, d, c, p, gradient)
     block = p.block
     q = tables.products
+    kind = find_kind(tables.first.shape[0], e)
     s = p.stiffness
     for c1 in range(len(axes[:3])):
         for c2 in range(c1 + 1):
@@ -116,10 +118,10 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
             # One fused loop over a contiguous 16-vector: most of a step is spent here.
             for k in range(16):
                 block[k] = (
-                    (s0 * q[e, 0, k] + s1 * q[e, 1, k] + s2 * q[e, 2, k])
-                    + (s3 * q[e, 3, k] + s4 * q[e, 4, k] + s5 * q[e, 5, k])
-                    + (s6 * q[e, 6, k] + s7 * q[e, 7, k] + s8 * q[e, 8, k])
-                    + (s9 * q[e, 9, k] + s10 * q[e, 10, k] + s11 * q[e, 11, k])
+                    (s0 * q[kind, 0, k] + s1 * q[kind, 1, k] + s2 * q[kind, 2, k])
+                    + (s3 * q[kind, 3, k] + s4 * q[kind, 4, k] + s5 * q[kind, 5, k])
+                    + (s6 * q[kind, 6, k] + s7 * q[kind, 7, k] + s8 * q[kind, 8, k])
+                    + (s9 * q[kind, 9, k] + s10 * q[kind, 10, k] + s11 * q[kind, 11, k])
                 )
             _add_outer(0, c1, c2, axial, p)
             if has_linear_mode:
@@ -155,22 +157,23 @@ def _scatter_turn(tables, e, p, band):  # type: ignore[no-untyped-def]
     """Adds the stiffness of theta, alone and with the place, to the band."""
     block = p.block
     q = tables.turn_products
+    kind = find_kind(tables.first.shape[0], e)
     s = p.stiffness
     for c in range(3):
         s0, s1, s2, s3 = s[3, c, 0], s[3, c, 1], s[3, c, 2], s[3, c, 3]
         s4, s5, s6, s7, s8 = s[3, c, 4], s[3, c, 5], s[3, c, 6], s[3, c, 7], s[3, c, 8]
         for k in range(16):
             block[k] = (
-                (s0 * q[e, 0, k] + s1 * q[e, 1, k] + s2 * q[e, 2, k])
-                + (s3 * q[e, 3, k] + s4 * q[e, 4, k] + s5 * q[e, 5, k])
-                + (s6 * q[e, 6, k] + s7 * q[e, 7, k] + s8 * q[e, 8, k])
+                (s0 * q[kind, 0, k] + s1 * q[kind, 1, k] + s2 * q[kind, 2, k])
+                + (s3 * q[kind, 3, k] + s4 * q[kind, 4, k] + s5 * q[kind, 5, k])
+                + (s6 * q[kind, 6, k] + s7 * q[kind, 7, k] + s8 * q[kind, 8, k])
             )
         _add_block(4, 4 * e, 3, c, block, band)
     s0, s1, s2 = s[3, 3, 0], s[3, 3, 1], s[3, 3, 2]
     s3, s4, s5 = s[3, 3, 3], s[3, 3, 4], s[3, 3, 5]
     for k in range(16):
-        block[k] = (s0 * q[e, 9, k] + s1 * q[e, 10, k] + s2 * q[e, 11, k]) + (
-            s3 * q[e, 12, k] + s4 * q[e, 13, k] + s5 * q[e, 14, k]
+        block[k] = (s0 * q[kind, 9, k] + s1 * q[kind, 10, k] + s2 * q[kind, 11, k]) + (
+            s3 * q[kind, 12, k] + s4 * q[kind, 13, k] + s5 * q[kind, 14, k]
         )
     _add_block(4, 4 * e, 3, 3, block, band)
 

@@ -4,7 +4,8 @@ An attachment is d rows, r(s) = position. A clamp has d - 1 more, r'(s) . e = 0 
 across the wanted tangent: the hose may stretch through it, but not turn. The rows' multipliers are
 the forces that a hold does to the hose, in space and on r'. In space a clamp also holds the angle
 of the material about the tangent: by a row for theta where there is one, else by the twist of the
-stretch to the next clamp (stretches.py).
+stretch to the next clamp (stretches.py). What joins the ends of a closed loop stands behind all of
+them (loops.py).
 """
 
 from __future__ import annotations
@@ -17,17 +18,19 @@ from numpy.typing import ArrayLike
 
 from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import solver, stretches
+from hose_mj.hoses.geds import loops, solver, stretches
 from hose_mj.hoses.geds.frames import lay_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.geds.twist import Twist
+from hose_mj.hoses.geds.twist import Twist, find_owners
 from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.model import Array, Hold, Reaction
 from hose_mj.hoses.spec import check_number
 
 _REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "kept")
 """What of the twist goes into a snapshot."""
+_FIRST_END, _LAST_END = -1, -2
+"""Numbers of the clamps at s = 0 and s = L of a closed loop, which hold nothing (twist.py)."""
 
 
 @dataclass
@@ -50,10 +53,12 @@ class HoldSet:
 
     Attributes:
         rows: what the kernels read and write; made anew by every change.
+        is_closed: whether the hose is a closed loop.
     """
 
     def __init__(self, spline: Spline, hose: solver.Hose) -> None:
         self._spline, self._hose = spline, hose
+        self.is_closed = False
         self._held: list[_Held] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
         self._n_made = 0
@@ -65,14 +70,19 @@ class HoldSet:
         """Rows of G, and of the twist between clamps."""
         return len(self.rows.start) + len(self.rows.twist.angle)
 
+    @property
+    def is_free(self) -> bool:
+        """True where nothing holds the hose in space."""
+        return not self._held
+
     def clear(self, x: Array, director: Array | None = None) -> None:
-        """Drops all holds; their numbers are not used again. The material's frames begin anew.
+        """Drops all holds and opens a loop; numbers are not used again. The frames begin anew.
 
         Args:
             x: the unknowns.
             director: of the material where the hose begins, (3,); any by default.
         """
-        self._held, self._clamps = [], []
+        self._held, self._clamps, self.is_closed = [], [], False
         twist = stretches.make_twist(self._spline, self._hose, [], x)
         if self._spline.has_theta:
             start = stretches.make_directors(self._spline, np.zeros(1), x)[0]
@@ -100,7 +110,10 @@ class HoldSet:
         spline = self._spline
         s = spline.check_place(arc_length)
         for held in self._held:
-            if abs(held.hold.arc_length - s) < 1e-9 * spline.length:
+            apart = abs(held.hold.arc_length - s)
+            if self.is_closed:
+                apart = min(apart, spline.length - apart)
+            if apart < 1e-9 * spline.length:
                 raise InputError("arc_length", s, "a place that no other hold is at")
         if position is None:
             point = spline.evaluate(np.array([s]), x)[0] + spline.offset
@@ -193,6 +206,28 @@ class HoldSet:
         self._held.remove(self._find(hold))
         self._rebuild(x)
 
+    def close(self, spin: float, x: Array) -> None:
+        """Joins s = L to s = 0, its material turned by `spin` (rad) about the tangent before.
+
+        Raises:
+            InputError: a hose that is closed, held at both ends or whose ends do not meet; a spin
+                in a plane.
+        """
+        check_number("spin", spin, may_be_negative=True)
+        if spin != 0.0 and self._spline.dimension == 2:
+            raise InputError("spin", spin, "0 for a hose in a plane")
+        loops.check_open(self.is_closed)
+        loops.check_ends(self._spline, [one.hold.arc_length for one in self._held], x)
+        self.is_closed = True
+        self._rebuild(x, spin)
+
+    def open(self, x: Array) -> None:
+        """Parts the ends of a closed loop; raises `InputError` for a hose that is open."""
+        if not self.is_closed:
+            raise InputError("open()", "an open hose", "a hose that was closed")
+        self.is_closed = False
+        self._rebuild(x)
+
     def reaction(self, hold: Hold, x: Array) -> Reaction:
         """Force and moment of a hold on the hose at the end of the last step, world frame."""
         held = self._find(hold)
@@ -214,8 +249,9 @@ class HoldSet:
         if self._spline.has_theta:
             return float(held.multipliers[-1])
         twist, clamp = self.rows.twist, self._clamps.index(held.hold.number)
-        arriving = float(twist.torque[twist.ends[:, 1] == clamp].sum())
-        return arriving - float(twist.torque[twist.ends[:, 0] == clamp].sum())
+        torque = twist.torque[find_owners(twist)]
+        arriving = float(torque[twist.ends[:, 1] == clamp].sum())
+        return arriving - float(torque[twist.ends[:, 0] == clamp].sum())
 
     # -- state ---------------------------------------------------------------------------------
 
@@ -233,7 +269,13 @@ class HoldSet:
         ]
         twist = {name: getattr(self.rows.twist, name).copy() for name in _REMEMBERED}
         before = self.rows.before.copy()
-        return {"held": held, "n_made": self._n_made, "before": before, "twist": twist}
+        return {
+            "held": held,
+            "n_made": self._n_made,
+            "is_closed": self.is_closed,
+            "before": before,
+            "twist": twist,
+        }
 
     def restore(self, state: dict[str, Any], x: Array) -> None:
         """Returns to a snapshot; x are the control points of the same moment."""
@@ -247,6 +289,7 @@ class HoldSet:
             for one in state["held"]
         ]
         self._n_made = max(self._n_made, state["n_made"])
+        self.is_closed = state["is_closed"]
         self._rebuild(x)
         self.rows.before[:] = state["before"]
         for name in _REMEMBERED:
@@ -268,25 +311,34 @@ class HoldSet:
         first = stretches.find_normal(tangent)
         return np.stack([first, np.cross(tangent, first)])
 
-    def _rebuild(self, x: Array) -> None:
-        """Makes everything anew from the list of holds; the material stays as it lies."""
+    def _rebuild(self, x: Array, spin: float = 0.0) -> None:
+        """Makes everything anew from the list of holds; the material stays as it lies.
+
+        `spin`: what the last end of a loop is turned by (rad).
+        """
         held = sorted(
             (one for one in self._held if one.tangent is not None),
             key=lambda one: one.hold.arc_length,
         )
         numbers = [one.hold.number for one in held]
+        places = [one.hold.arc_length for one in held]
+        if self.is_closed:
+            numbers = [_FIRST_END, *numbers, _LAST_END]
+            places = [0.0, *places, self._spline.length]
         if self._spline.dimension == 2 or numbers == self._clamps:
             self.rows = self._make_rows_of_all(x, self.rows.twist)
             return
         same = {k: self._clamps.index(n) for k, n in enumerate(numbers) if n in self._clamps}
-        places = [one.hold.arc_length for one in held]
         twist = stretches.make_twist(self._spline, self._hose, places, x)
         if self._spline.has_theta:
             n_spans = len(self._hose.tables.first)
             stretches.take_over_frames(twist, self.rows.twist, same, n_spans)
         else:
-            old = self.rows.twist
+            old = stretches.part_ends(self._spline, self._hose, self.rows.twist, x)
             stretches.take_over_twist(self._spline, self._hose, twist, old, same, x)
+            if self.is_closed:
+                twist = stretches.join_ends(twist, spin)
+            stretches.settle(twist)
         self._clamps = numbers
         self.rows = self._make_rows_of_all(x, twist)
 
@@ -297,17 +349,17 @@ class HoldSet:
         and not before it begins.
         """
         d, width = self._spline.dimension, 4 * self._spline.stride
-        m = sum(len(held.multipliers) for held in self._held)
+        m = sum(len(held.multipliers) for held in self._held) + 2 * d * self.is_closed
         start = np.zeros(m, dtype=np.int64)
-        coefficients, before, after = np.zeros((m, width)), np.zeros(m), np.zeros(m)
-        multipliers = np.zeros(m)
+        coefficients = np.zeros((m, width * (1 + self.is_closed)))
+        before, after, multipliers = np.zeros((3, m))
         first = 0
         for held in self._held:
             own = slice(first, first + len(held.multipliers))
             places, values = self._spline.compute_basis(np.array([held.hold.arc_length]))
             start[own] = places[0]
-            coefficients[own] = self._make_rows(held, values[0])
-            before[own] = coefficients[own] @ x[places[0] : places[0] + width]
+            coefficients[own, :width] = self._make_rows(held, values[0])
+            before[own] = coefficients[own, :width] @ x[places[0] : places[0] + width]
             after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
             if held.tangent is not None and self._spline.has_theta:
                 after[own.stop - 1] = before[own.stop - 1]
@@ -316,15 +368,18 @@ class HoldSet:
             # A view: what the kernels write belongs to the hold.
             held.multipliers, held.first = multipliers[own], first
             first = own.stop
+        if self.is_closed:
+            coefficients[first:] = loops.make_joint_rows(self._spline)
+            before[first:] = coefficients[first:, :width] @ x[:width]
+            before[first:] += coefficients[first:, width:] @ x[-width:]
         return solver.Holds(start, coefficients, before, after, multipliers, twist)
 
     def _aim(self, held: _Held, x: Array) -> None:
         """What `_rebuild` does for a hold of which only the position has changed."""
         d, rows = self._spline.dimension, self.rows
         own = slice(held.first, held.first + len(held.multipliers))
-        start = rows.start[held.first]
-        window = slice(start, start + rows.rows.shape[1])
-        rows.before[own] = rows.rows[own] @ x[window]
+        start, width = rows.start[held.first], 4 * self._spline.stride
+        rows.before[own] = rows.rows[own, :width] @ x[start : start + width]
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
 

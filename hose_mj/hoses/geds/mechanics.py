@@ -12,7 +12,7 @@ from hose_mj.hoses.geds.fittings import average_density, average_stiffness, make
 from hose_mj.hoses.geds.frenet import SMALLEST_BEND
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.geds.twist import Twist
+from hose_mj.hoses.geds.twist import Twist, find_owners
 from hose_mj.hoses.model import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
 
@@ -122,12 +122,13 @@ def make_dense(band: Array, size: int, width: int) -> Array:
     return dense
 
 
-def make_dense_rows(holds: solver.Holds, size: int) -> Array:
-    """Returns the rows of the holds as a matrix (m, size)."""
+def make_dense_rows(holds: solver.Holds, size: int, width: int) -> Array:
+    """Returns the rows of the holds, which read `width` unknowns each, as a matrix (m, size)."""
     dense = np.zeros((len(holds.start), size))
-    width = holds.rows.shape[1]
     for row, start in enumerate(holds.start):
-        dense[row, start : start + width] = holds.rows[row]
+        dense[row, start : start + width] = holds.rows[row, :width]
+    if holds.rows.shape[1] > width:
+        dense[:, size - width :] += holds.rows[:, width:]
     return dense
 
 
@@ -146,7 +147,7 @@ def compute_linearization(
     work.band[:] = 0.0
     run_kernel(solver.add_mass, axes, hose, 1.0, work.band)
     mass = make_dense(work.band, size, width)
-    return Linearization(mass, stiffness, make_dense_rows(holds, size))
+    return Linearization(mass, stiffness, make_dense_rows(holds, size, width))
 
 
 def interpolate_tension(forces: Array, length: float, s: Array) -> Array:
@@ -201,9 +202,8 @@ def compute_twist(spline: Spline, hose: solver.Hose, stretches: Twist, s: Array,
         return np.asarray(spline.evaluate_theta(s, x, 1) + gathered - rest)
     rate = np.zeros(len(s))
     places = stretches.places * hose.tables.span_length
-    for (first, last), torque in zip(
-        stretches.ends, stretches.angle / stretches.compliance, strict=True
-    ):
+    torques = (stretches.angle / stretches.compliance)[find_owners(stretches)]
+    for (first, last), torque in zip(stretches.ends, torques, strict=True):
         inside = (s >= places[first]) & (s <= places[last])
         rate[inside] = torque / find_torsional_stiffness(hose, s[inside])
     return rate

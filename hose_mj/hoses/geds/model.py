@@ -115,7 +115,8 @@ class GedsHose(Touching, SplineBody):
     ) -> None:
         """Lays the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
 
-        The material is laid free of torque, but for twist="frenet" (docs/frenet.md).
+        The material is laid free of torque, but for twist="frenet" (docs/frenet.md). A closed loop
+        is open again.
 
         Args:
             curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.
@@ -172,9 +173,10 @@ class GedsHose(Touching, SplineBody):
         self._steps = state["steps"]
         self.iterations, self.fallbacks = state["iterations"], state["fallbacks"]
         self._loads.restore(state["loads"])
-        self._contacts.restore(state["contacts"])
-        self._loads.set_contact(self._contacts.contact)
         self._holds.restore(state["holds"], self._state.x)
+        self._contacts.restore(state["contacts"])
+        self._contacts.set_closed(self.is_closed)
+        self._loads.set_contact(self._contacts.contact)
         self._renew_work()
 
     # -- holds and loads ---------------------------------------------------------------------------
@@ -236,6 +238,37 @@ class GedsHose(Touching, SplineBody):
         """
         return self._holds.reaction(hold, self._state.x)
 
+    def close(self, spin: float = 0.0) -> None:
+        """Joins the end of the hose to its beginning: an O-ring, a belt, a rubber band.
+
+        Place and r' go on across the joint from the end of the next step on, and so does the
+        material: its end is turned by `spin` (rad, right-handed about the tangent, any number of
+        turns) and then glued. Lay the hose along a closed curve first (`loops.make_circle`).
+        `open` and `reset` part the ends.
+
+        Raises:
+            InputError: a hose with theta, one that is closed or held at both ends, ends that do not
+                meet, a spin in a plane. Nothing changed then.
+        """
+        if self._spline.has_theta:
+            raise InputError("twist", "theta", "scalar for a hose that is to be closed")
+        self._holds.close(spin, self._state.x)
+        self._contacts.set_closed(True)
+        self._loads.set_contact(self._contacts.contact)
+        self._renew_work()
+
+    def open(self) -> None:
+        """Parts the ends that `close` has joined; raises `InputError` for an open hose."""
+        self._holds.open(self._state.x)
+        self._contacts.set_closed(False)
+        self._loads.set_contact(self._contacts.contact)
+        self._renew_work()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the ends are joined."""
+        return self._holds.is_closed
+
     def apply_force(self, arc_length: float, force: ArrayLike) -> None:
         """Adds a point force (3,) N that acts until `clear_loads` (thesis A.27)."""
         self._loads.add_force(arc_length, force)
@@ -280,10 +313,14 @@ class GedsHose(Touching, SplineBody):
         The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
 
         Raises:
-            InputError: load_steps is not a whole number from 1 to 64.
+            InputError: load_steps is not a whole number from 1 to 64; a closed loop that nothing
+                holds.
             StepError: no equilibrium was found; the state before is kept.
         """
         check_count("load_steps", load_steps, 1, statics.MOST_LOAD_STEPS)
+        if self.is_closed and self._holds.is_free:
+            valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
+            raise InputError("holds of a closed loop", "none", valid)
         found = statics.find_equilibrium(
             *(self._axes, self._hose, self._holds.rows, self._loads.loads),
             *(self._state.x, self._work, int(load_steps)),
@@ -330,7 +367,7 @@ class GedsHose(Touching, SplineBody):
 
     def _start(self, director: Array | None = None) -> None:
         self._steps = 0
-        self._contacts.rebuild()
+        self._contacts.set_closed(False)
         self._loads.set_contact(self._contacts.contact)
         self._loads.clear()
         self._holds.clear(self._state.x, director)

@@ -34,8 +34,31 @@ TANGENT, SLOPE, DIRECTOR, RATE = 0, 3, 6, 9
 
 
 @inlined
+def compute_cosine_and_sine(angle):  # type: ignore[no-untyped-def]
+    """Cosine and sine of an angle (rad) to the rounding of the angle, for less than two calls.
+
+    Their power series about the nearest multiple of pi / 2.
+    """
+    quarter = np.round(angle * (2.0 / np.pi))
+    r = angle - quarter * (0.5 * np.pi)
+    q = r * r
+    c = 1.0 - q / 182.0 * (1.0 - q / 240.0)
+    c = 1.0 - q / 56.0 * (1.0 - q / 90.0 * (1.0 - q / 132.0 * c))
+    c = 1.0 - q / 2.0 * (1.0 - q / 12.0 * (1.0 - q / 30.0 * c))
+    s = 1.0 - q / 156.0 * (1.0 - q / 210.0)
+    s = 1.0 - q / 42.0 * (1.0 - q / 72.0 * (1.0 - q / 110.0 * s))
+    s = r * (1.0 - q / 6.0 * (1.0 - q / 20.0 * s))
+    quadrant = quarter - 4.0 * np.floor(0.25 * quarter)
+    if quadrant == 1.0 or quadrant == 3.0:
+        c, s = -s, c
+    if quadrant >= 2.0:
+        c, s = -c, -s
+    return c, s
+
+
+@inlined
 def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
-    """Takes frame f along to a new a = r' and b = r''."""
+    """Takes frame f along to a new a = r' and b = r''; returns 1 / |a|."""
     inverse = 1.0 / np.sqrt(max(a0 * a0 + a1 * a1 + a2 * a2, SMALLEST_A))
     t0, t1, t2 = a0 * inverse, a1 * inverse, a2 * inverse
     along = t0 * b0 + t1 * b1 + t2 * b2
@@ -56,22 +79,22 @@ def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-de
     frames[f, 8] = d2 - factor * (u2 + t2)
     frames[f, 0], frames[f, 1], frames[f, 2] = t0, t1, t2
     frames[f, 3], frames[f, 4], frames[f, 5] = s0, s1, s2
+    return inverse
 
 
 @inlined
 def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
-    """Moves the frame of Gauss point g and returns K1, K2 and the twist there.
+    """Moves the frame of Gauss point g and returns K1, K2 and the twist there, and 1 / A.
 
     Writes their derivatives by (a, theta') and (b, theta) to p.strains, m1 and m2 to p.directors.
     """
     a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
     b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
-    move_frame(frames, f, a0, a1, a2, b0, b1, b2)
-    inverse = 1.0 / max(a0 * a0 + a1 * a1 + a2 * a2, SMALLEST_A)
-    root = np.sqrt(inverse)
+    root = move_frame(frames, f, a0, a1, a2, b0, b1, b2)
+    inverse = root * root
     t0, t1, t2 = frames[f, 0], frames[f, 1], frames[f, 2]
     d0, d1, d2 = frames[f, 6], frames[f, 7], frames[f, 8]
-    cosine, sine = np.cos(p.b[g, 3]), np.sin(p.b[g, 3])
+    cosine, sine = compute_cosine_and_sine(p.b[g, 3])
     u0 = cosine * d0 + sine * (t1 * d2 - t2 * d1)
     u1 = cosine * d1 + sine * (t2 * d0 - t0 * d2)
     u2 = cosine * d2 + sine * (t0 * d1 - t1 * d0)
@@ -101,7 +124,7 @@ def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
     s[1, 1, 3] = -first
     s[2, 0, 0], s[2, 0, 1], s[2, 0, 2] = k0 * root, k1 * root, k2 * root
     s[2, 0, 3] = 1.0
-    return first, second, p.a[g, 3] + frames[f, 9]
+    return first, second, p.a[g, 3] + frames[f, 9], inverse
 
 
 @inlined
@@ -119,7 +142,7 @@ def set_rod(elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[n
         p: work arrays.
     """
     f = 3 * e + g
-    first, second, twist = compute_rod_strains(frames, f, g, p)
+    first, second, twist, inverse = compute_rod_strains(frames, f, g, p)
     tau = elasticity.damping_time
     c0 = weight * elasticity.bending_stiffness[e, g]
     c1 = weight * elasticity.second_stiffness[e, g]
@@ -159,15 +182,17 @@ def set_rod(elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[n
     q[3, 3, g] = c2
     q[3, 3, 3 + g] = c0 * s[0, 1, 3] ** 2 + c1 * s[1, 1, 3] ** 2
     if exact != 0.0:
-        _add_second_derivatives(frames, f, g, s0, s1, s2, p)
+        _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p)
 
 
 @inlined
-def _add_second_derivatives(frames, f, g, s0, s1, s2, p):  # type: ignore[no-untyped-def]
-    """Adds what stresses s0, s1, s2 times the strains' second derivatives make (see above)."""
+def _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p):  # type: ignore[no-untyped-def]
+    """Adds what stresses s0, s1, s2 times the strains' second derivatives make (see above).
+
+    `inverse` is 1 / A.
+    """
     a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
     b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
-    inverse = 1.0 / max(a0 * a0 + a1 * a1 + a2 * a2, SMALLEST_A)
     t0, t1, t2 = frames[f, 0], frames[f, 1], frames[f, 2]
     m = p.directors
     # W and V = t x W.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import choose_by_unknowns, compiled, inlined, merged
+from hose_mj.compiled import choose_by_unknowns, compiled, inlined, kernel, merged
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.solver import (
@@ -22,6 +22,7 @@ from hose_mj.hoses.geds.solver import (
     add_mass,
     build,
     make_work,
+    multiply_row,
     newton,
     solve_with_holds,
 )
@@ -219,12 +220,13 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
     for half in range(2):
         # First half: lambda such that x_(n+1) meets the holds. Second: such that v_(n+1) does.
         for row in range(len(holds.start)):
-            gap = holds.after[row] if half == 0 else (holds.after[row] - holds.before[row]) / dt
-            for k in range(width):
-                at = holds.start[row] + k
-                aim = work.X[at] + dt * work.V[at] if half == 0 else work.V[at]
-                gap -= holds.rows[row, k] * aim
-            work.shift[row] = 2.0 * gap / (dt * dt if half == 0 else dt)
+            speed = multiply_row(axes, holds, row, work.V, size)
+            if half == 0:
+                gap = holds.after[row] - multiply_row(axes, holds, row, work.X, size)
+                work.shift[row] = 2.0 * (gap - dt * speed) / (dt * dt)
+            else:
+                wanted = (holds.after[row] - holds.before[row]) / dt
+                work.shift[row] = 2.0 * (wanted - speed) / dt
         # A stage of infinite length has no inertia: what it builds is the force.
         infinite = (np.inf, work.X, work.V)
         build(axes, hose, infinite, holds.twist, 1.0, loads, 1.0, True, work.X, work)
@@ -252,6 +254,25 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
     return DONE
 
 
+@kernel
+def _take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
+    """Takes one step, but for what ends it with the twist; returns a verdict.
+
+    It allocates nothing, so numba counts no references to the arrays in its records: to count them
+    would cost a short hose nearly as much as the step itself.
+    """
+    if scheme == _VERLET:
+        verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
+    else:
+        verdict = _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+    if verdict == DONE:
+        counts[STEPS] += 1
+        for row in range(len(holds.start)):
+            holds.multipliers[row] = work.multipliers[row]
+            holds.before[row] = holds.after[row]
+    return verdict
+
+
 @compiled
 def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts):  # type: ignore[no-untyped-def]
     """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
@@ -263,17 +284,8 @@ def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts
     n_rows = len(holds.start) + len(holds.twist.angle)
     work = make_work(hose.mass.shape[0], len(axes), n_rows)
     for _ in range(n_steps):
-        if scheme == _VERLET:
-            verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
-        else:
-            verdict = _step_implicit(
-                axes, hose, holds, loads, limits, scheme, dt, state, work, counts
-            )
+        verdict = _take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        counts[STEPS] += 1
-        for row in range(len(holds.start)):
-            holds.multipliers[row] = work.multipliers[row]
-            holds.before[row] = holds.after[row]
         _accept(axes, hose, holds, state, work.span)
     return DONE

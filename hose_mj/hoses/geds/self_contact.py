@@ -3,8 +3,8 @@
 The contact points are joined to a polyline. Each is pushed away from every other stretch of it
 that comes closer than two radii, by half of k max(0, S(g) - tau S'(g) u.n) per length at the place
 nearest on it, where the same force acts the other way: linear and angular momentum are exact. The
-other half comes from the other stretch's own points. Stretches nearer than `REACH` radii of arc do
-not touch.
+other half comes from the other stretch's own points. Stretches nearer than `REACH` radii of arc,
+either way round a closed loop, do not touch.
 
 The matrix gets only the blocks on the band: how a force here depends on a place far along the hose
 is left out. Newton's iteration then converges by k (1 + tau / h) over that plus rho / h^2 at each
@@ -20,6 +20,7 @@ from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.contact import press, scatter
 from hose_mj.hoses.geds.contact_law import (
     RADIUS,
+    ROUND,
     SELF_DAMPING,
     SELF_STIFFNESS,
     WIDTH,
@@ -107,6 +108,10 @@ def add_self_contact(axes, contact, x, rate, step, gradient, band):  # type: ign
                 for j in range(f * per_span, min((f + 1) * per_span, n_segments)):
                     gap_in_arc = max(contact.arcs[j] - contact.arcs[q], 0.0)
                     gap_in_arc = max(gap_in_arc, contact.arcs[q] - contact.arcs[j + 1])
+                    far = max(
+                        contact.arcs[j + 1] - contact.arcs[q], contact.arcs[q] - contact.arcs[j]
+                    )
+                    gap_in_arc = min(gap_in_arc, contact.law[ROUND] - far)
                     if gap_in_arc < REACH * contact.law[RADIUS]:
                         continue
                     square, t = _find_nearest(room, q, j)

@@ -67,7 +67,8 @@ class Holds(NamedTuple):
 
     Attributes:
         start: index of the first of the 4 d unknowns that a row reads, (m,).
-        rows: their coefficients, (m, 4 d).
+        rows: their coefficients, (m, 4 d). In a closed loop (m, 8 d): the last 2 d rows, which join
+            its ends (loops.py), also read the last 4 d unknowns.
         before: g at the beginning of a step, (m,).
         after: g at its end, (m,).
         multipliers: lambda at the end of the last step, (m,), written.
@@ -294,16 +295,32 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):  # 
 
 
 @inlined
+def multiply_row(axes, holds, row, x, size):  # type: ignore[no-untyped-def]
+    """Returns what one row of G makes of x, of which the first `size` entries count."""
+    width = 4 * len(axes)
+    value = 0.0
+    for k in range(width):
+        value += holds.rows[row, k] * x[holds.start[row] + k]
+    for k in range(width, holds.rows.shape[1]):
+        value += holds.rows[row, k] * x[size - 2 * width + k]
+    return value
+
+
+@inlined
 def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untyped-def]
     """Adds weight G^T G to the band and G^T (g - G x) to the right-hand side; lambda is the same.
 
-    work.shift holds g - G x on entry.
+    work.shift holds g - G x on entry. The rows that join the ends of a loop have no place in a
+    band, and no part in this: they hold back no rigid motion.
     """
     width = 4 * len(axes)
+    n_local = len(holds.start)
+    if holds.rows.shape[1] > width:
+        n_local -= 2 * len(axes)
     mean = 0.0
     for k in range(size):
         mean += abs(work.band[k, 0]) / size
-    for row in range(len(holds.start)):
+    for row in range(n_local):
         start = holds.start[row]
         norm = 0.0
         for k in range(width):
@@ -339,6 +356,8 @@ def solve_with_holds(axes, holds, softness, n_negative, size, work):  # type: ig
             z[row, k] = 0.0
         for k in range(width):
             z[row, holds.start[row] + k] = holds.rows[row, k]
+        for k in range(width, holds.rows.shape[1]):
+            z[row, size - 2 * width + k] += holds.rows[row, k]
     for row in range(n_holds, m):
         work.shift[row] = 0.0
         for k in range(size):
@@ -541,13 +560,10 @@ _shift_clamps = choose_by_unknowns({4: _shift})
 @inlined
 def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-untyped-def]
     """Writes g - G x into work.shift and adds the holds' weight to the matrix."""
-    width = 4 * len(axes)
     for row in range(len(holds.start)):
         before = holds.before[row]
-        value = before + fraction * (holds.after[row] - before)
-        for k in range(width):
-            value -= holds.rows[row, k] * x[holds.start[row] + k]
-        work.shift[row] = value
+        wanted = before + fraction * (holds.after[row] - before)
+        work.shift[row] = wanted - multiply_row(axes, holds, row, x, len(x))
     _shift_clamps(axes, holds.twist, fraction, work.shift)
     if weight > 0.0:
         _add_hold_weight(axes, holds, weight, len(x), work)

@@ -15,7 +15,7 @@ from hose_mj.compiled import run_kernel
 from hose_mj.hoses.geds import solver
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.geds.twist import Twist, measure_twist
+from hose_mj.hoses.geds.twist import Twist, find_owners, measure_twist
 from hose_mj.hoses.model import Array
 
 _NODES = np.polynomial.legendre.leggauss(3)[0]
@@ -136,7 +136,7 @@ def take_over_twist(
         spline: the hose's geometry.
         hose: its constants.
         new: as made by `make_twist`; written.
-        old: what was there before.
+        old: what was there before, a closed loop parted.
         same: the clamp in `old` of each clamp of `new` that was there.
         x: the unknowns.
     """
@@ -161,8 +161,70 @@ def take_over_twist(
     for k in range(anchor - 1, -1, -1):
         turn_director(new, k, measure(k) - wanted[k])
     new.angle[:] = wanted
-    new.trial[:] = wanted
-    new.torque[:] = wanted / new.compliance
+
+
+def settle(twist: Twist) -> None:
+    """Gives all stretches the moment of their present angle."""
+    twist.trial[:] = twist.angle
+    twist.torque[:] = twist.angle / twist.compliance
+
+
+def join_ends(twist: Twist, spin: float) -> Twist:
+    """Returns the twist of a closed loop: its first leg and its last become one stretch.
+
+    The directors of its ends are glued at one tangent, so they stay together from then on wherever
+    it goes.
+
+    Args:
+        twist: of its legs as stretches of an open hose, with clamps at both ends; written.
+        spin: what the last end is turned by before (rad).
+    """
+    last = len(twist.starts) - 1
+    turn_director(twist, last, spin)
+    twist.angle[-1:] += spin
+    between = twist.directors[0, :3] + twist.directors[last, :3]
+    between /= np.linalg.norm(between)
+    for clamp in (0, last):
+        tangent, director = twist.directors[clamp, :3], twist.directors[clamp, 3:]
+        twist.directors[clamp, 3:] = carry_director(tangent, between, director)
+        twist.directors[clamp, :3] = between
+    if len(twist.ends) < 2:
+        return twist
+    compliance, angle = twist.compliance[:-1].copy(), twist.angle[:-1].copy()
+    compliance[0] += twist.compliance[-1]
+    angle[0] += twist.angle[-1]
+    return twist._replace(
+        compliance=compliance,
+        angle=angle,
+        trial=angle.copy(),
+        torque=np.zeros_like(angle),
+        rows=twist.rows[:-1].copy(),
+    )
+
+
+def part_ends(spline: Spline, hose: solver.Hose, twist: Twist, x: Array) -> Twist:
+    """Returns the legs of a closed loop as stretches of an open hose; see `join_ends`.
+
+    The first leg and the last each get the angle that their compliance asks for, so the material
+    between them is where it really is.
+    """
+    if len(twist.ends) == len(twist.angle):
+        return twist
+    compliance = np.array([measure_compliance(hose, part) for part in twist.weights])
+    angle = (twist.angle / twist.compliance)[find_owners(twist)] * compliance
+    parted = twist._replace(
+        directors=twist.directors.copy(),
+        compliance=compliance,
+        angle=angle,
+        trial=angle.copy(),
+        torque=np.zeros_like(angle),
+        rows=np.zeros((len(angle), twist.rows.shape[1])),
+    )
+    run_kernel(measure_twist, spline.axes, hose.tables, parted, x, make_span())
+    gap = float(parted.trial[0] - angle[0])
+    for clamp in (0, len(parted.starts) - 1):
+        turn_director(parted, clamp, gap)
+    return parted
 
 
 def take_over_frames(new: Twist, old: Twist, same: dict[int, int], n_spans: int) -> None:

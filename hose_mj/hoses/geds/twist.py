@@ -14,6 +14,11 @@ The carried director turns in every span
 The variation of Phi by the shape is the integral of kb . da / |a| (kb = a x b / A): a moment M
 works on the hose like the gradient M times that. Nothing is integrated in time, so nothing drifts.
 A stretch that ends at a free end carries no moment and is not here.
+
+A closed loop has two more clamps, which hold nothing: at s = 0 and at s = L, where the material has
+been joined. They cut it into legs, each as between two clamps of an open hose. Where there are
+other clamps, the first leg and the last are one stretch with one moment, and only the sum of their
+angles counts.
 """
 
 from __future__ import annotations
@@ -28,7 +33,9 @@ from hose_mj.hoses.model import Array
 
 
 class Twist(NamedTuple):
-    """C clamps and the K stretches between them.
+    """C clamps and the K stretches between them, one leg each; see above for a closed loop.
+
+    Leg k belongs to stretch k; where there is one more leg than stretches, the last to stretch 0.
 
     Attributes:
         starts: index of the first of the unknowns that shape the hose at a clamp, (C,).
@@ -37,10 +44,10 @@ class Twist(NamedTuple):
         directors: tangent and director of each clamp at the beginning of a step, (C, 6).
         spin: turn of each clamp about its tangent within the step (rad) and its rate (rad/s),
             (C, 2).
-        ends: first and last clamp of each stretch, (K, 2).
-        spans: first and last span of each stretch, (K, 2).
-        weights: Gauss weights times length, of the part of a span that is in the stretch,
-            (K, S, 3).
+        ends: first and last clamp of each leg, (legs, 2).
+        spans: first and last span of each leg, (legs, 2).
+        weights: Gauss weights times length, of the part of a span that is in the leg,
+            (legs, S, 3).
         compliance: integral of ds / GJ (1 / (N m)), (K,).
         angle: Phi less its rest value at the beginning of a step (rad), (K,).
         trial: the same at the present iterate, (K,).
@@ -49,7 +56,7 @@ class Twist(NamedTuple):
             clamps, at the present iterate, (3 S + C, 10).
         kept: the same at the beginning of a step.
         turn_rows: row of the holds that fixes theta at each clamp, (C,).
-        carried: work: the tangent u, the director and the sum of item 2, (K, 7).
+        carried: work: the tangent u, the director and the sum of item 2, (legs, 7).
         rows: derivative of Phi by the unknowns, (K, size + padding).
     """
 
@@ -70,6 +77,11 @@ class Twist(NamedTuple):
     turn_rows: np.ndarray
     carried: Array
     rows: Array
+
+
+def find_owners(twist: Twist) -> np.ndarray:
+    """Returns the stretch of each leg, (legs,)."""
+    return np.arange(len(twist.ends)) % max(len(twist.angle), 1)
 
 
 @inlined
@@ -112,14 +124,15 @@ def start_twist(twist):  # type: ignore[no-untyped-def]
 
 @inlined
 def open_stretches(axes, twist, x):  # type: ignore[no-untyped-def]
-    """Puts the director of each stretch's first clamp where the tangent now is there."""
-    for k in range(len(twist.angle)):
+    """Puts the director of each leg's first clamp where the tangent now is there."""
+    for k in range(len(twist.ends)):
         clamp = twist.ends[k, 0]
         u0, u1, u2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
         d0, d1, d2 = carry_clamp(twist.directors, clamp, u0, u1, u2)
         twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2] = u0, u1, u2
         twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5] = d0, d1, d2
         twist.carried[k, 6] = 0.0
+    for k in range(len(twist.angle)):
         for i in range(twist.rows.shape[1]):
             twist.rows[k, i] = 0.0
 
@@ -131,11 +144,12 @@ def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-d
     The derivative of Phi goes to twist.rows, the moment's geometric stiffness (scaled by `exact`,
     with the moment of the last iterate) to p.stiffness; the force follows in `close_stretches`.
     """
-    for k in range(len(twist.angle)):
+    for k in range(len(twist.ends)):
         if e < twist.spans[k, 0] or e > twist.spans[k, 1]:
             continue
+        owner = k if k < len(twist.angle) else 0
         u0, u1, u2 = twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2]
-        moment = exact * twist.torque[k]
+        moment = exact * twist.torque[owner]
         total = 0.0
         for g in range(3):
             weight = twist.weights[k, e, g]
@@ -155,9 +169,9 @@ def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-d
             for i in range(4):
                 slope = tables.first[e, g, i]
                 at = 3 * (e + i)
-                twist.rows[k, at] += slope * s0
-                twist.rows[k, at + 1] += slope * s1
-                twist.rows[k, at + 2] += slope * s2
+                twist.rows[owner, at] += slope * s0
+                twist.rows[owner, at + 1] += slope * s1
+                twist.rows[owner, at + 2] += slope * s2
             # By (a, a): -3/2 (t kb^T + kb t^T) / A; by (a, b): [t]x / (2 A).
             aa = -1.5 * moment * weight * inverse
             ab = 0.5 * moment * weight * inverse
@@ -187,17 +201,36 @@ def add_twist(axes, tables, twist, e, exact, x, p):  # type: ignore[no-untyped-d
 
 
 @inlined
-def find_angle(twist, k, near):  # type: ignore[no-untyped-def]
-    """Sets twist.trial of stretch k, whose director has come to the last clamp.
-
-    Of all angles that differ by whole turns it is the one closest to `near`.
-    """
+def _measure_leg(twist, k):  # type: ignore[no-untyped-def]
+    """The angle of leg k, whose director has come to the last clamp, but for whole turns."""
     last = twist.ends[k, 1]
     t0, t1, t2 = twist.carried[k, 0], twist.carried[k, 1], twist.carried[k, 2]
     d0, d1, d2 = twist.carried[k, 3], twist.carried[k, 4], twist.carried[k, 5]
     e0, e1, e2 = carry_clamp(twist.directors, last, t0, t1, t2)
     across = t0 * (d1 * e2 - d2 * e1) + t1 * (d2 * e0 - d0 * e2) + t2 * (d0 * e1 - d1 * e0)
-    angle = np.arctan2(across, d0 * e0 + d1 * e1 + d2 * e2) - twist.carried[k, 6]
+    return np.arctan2(across, d0 * e0 + d1 * e1 + d2 * e2) - twist.carried[k, 6]
+
+
+@inlined
+def _find_spin(twist, k, column):  # type: ignore[no-untyped-def]
+    """What the clamps' spins, or rates of spin (column 1), add to the angle of stretch k."""
+    spin = twist.spin[twist.ends[k, 1], column] - twist.spin[twist.ends[k, 0], column]
+    if k == 0:
+        for leg in range(len(twist.angle), len(twist.ends)):
+            spin += twist.spin[twist.ends[leg, 1], column] - twist.spin[twist.ends[leg, 0], column]
+    return spin
+
+
+@inlined
+def find_angle(twist, k, near):  # type: ignore[no-untyped-def]
+    """Sets twist.trial of stretch k, whose directors have come to the last clamps.
+
+    Of all angles that differ by whole turns it is the one closest to `near`.
+    """
+    angle = _measure_leg(twist, k)
+    if k == 0:
+        for leg in range(len(twist.angle), len(twist.ends)):
+            angle += _measure_leg(twist, leg)
     turn = 2.0 * np.pi
     twist.trial[k] = angle + turn * np.round((near - angle) / turn)
 
@@ -219,10 +252,9 @@ def close_stretches(twist, in_statics, fraction, tau, rate, gradient):  # type: 
     """
     for k in range(len(twist.angle)):
         find_angle(twist, k, twist.trial[k] if in_statics else twist.angle[k])
-        first, last = twist.ends[k, 0], twist.ends[k, 1]
-        angle = twist.trial[k] + fraction * (twist.spin[last, 0] - twist.spin[first, 0])
+        angle = twist.trial[k] + fraction * _find_spin(twist, k, 0)
         if tau != 0.0:
-            speed = twist.spin[last, 1] - twist.spin[first, 1]
+            speed = _find_spin(twist, k, 1)
             for i in range(twist.rows.shape[1]):
                 speed += twist.rows[k, i] * rate[i]
             angle += tau * speed
@@ -243,8 +275,7 @@ def predict_twist(twist, factor, step):  # type: ignore[no-untyped-def]
 def accept_twist(axes, twist, x):  # type: ignore[no-untyped-def]
     """Ends a step: Phi becomes the last iterate's, the clamps' directors go along with the hose."""
     for k in range(len(twist.angle)):
-        first, last = twist.ends[k, 0], twist.ends[k, 1]
-        twist.angle[k] = twist.trial[k] + twist.spin[last, 0] - twist.spin[first, 0]
+        twist.angle[k] = twist.trial[k] + _find_spin(twist, k, 0)
     for clamp in range(len(twist.starts)):
         t0, t1, t2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)
         d0, d1, d2 = carry_clamp(twist.directors, clamp, t0, t1, t2)

@@ -124,3 +124,19 @@ def test_quadrature_tables_integrate_polynomials():
     assert tables.weights @ tables.linear**2 == pytest.approx(1.0, rel=1e-14)
     assert tables.weights @ tables.linear == pytest.approx(0.0, abs=1e-15)
     assert tables.span_length * len(tables.first) == pytest.approx(2.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("n", [5, 6, 9, 10, 11, 24])
+def test_every_span_finds_its_products(n):
+    tables = basis.make_tables(basis.make_knots(n, 1.3))
+    n_spans = n - 3
+    assert len(tables.products) == len(tables.turn_products) == min(n_spans, 7)
+    value, first, second = tables.value, tables.first, tables.second
+    pairs = [(first, first), (first, second), (second, first), (second, second)]
+    of_theta = [(first, first), (value, first), (value, second), (first, first), (value, value)]
+    for e in range(n_spans):
+        kind = basis.find_kind(n_spans, e)
+        for table, factors in ((tables.products, pairs), (tables.turn_products, of_theta)):
+            wanted = [np.outer(a[e, g], b[e, g]).ravel() for a, b in factors for g in range(3)]
+            scale = np.abs(wanted).max()
+            np.testing.assert_allclose(table[kind], wanted, atol=1e-12 * scale)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import basis, energy, frames, mechanics, schemes, solver, stretches
+from hose_mj.hoses.geds import basis, energy, frames, mechanics, rod, schemes, solver, stretches
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import HoseSpec
@@ -242,3 +242,15 @@ def test_laying_frames_anew_keeps_the_material_at_the_clamps_and_the_twist():
     np.testing.assert_allclose(holds.before, wanted, atol=1e-3)
     found = SPLINE.evaluate_theta(np.array(spec_clamps), state.x)
     np.testing.assert_allclose(found, holds.before, atol=1e-7)
+
+
+def test_cosine_and_sine_are_as_exact_as_the_angle():
+    rng = np.random.default_rng(4)
+    corners = np.arange(-40, 41) * np.pi / 4
+    for angle in np.concatenate([rng.uniform(-4, 4, 500), rng.uniform(-2e3, 2e3, 500), corners]):
+        found = rod.compute_cosine_and_sine(angle)
+        np.testing.assert_allclose(
+            found, [np.cos(angle), np.sin(angle)], rtol=0, atol=4e-16 * (1.0 + abs(angle))
+        )
+    assert rod.compute_cosine_and_sine(0.0) == (1.0, 0.0)
+    assert np.all(np.isnan(rod.compute_cosine_and_sine(np.nan)))

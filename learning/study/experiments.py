@@ -172,6 +172,9 @@ _TEAMS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """Goal modules that see their agent's cell and neighbours learn more than those that see everybody,
 and D-QL more where it keeps its policy."""
+HELD = "d-rr-ql"
+N_PEER_SEEDS = 3
+"""Seeds of what is only reported beside it: these runs take most of the time."""
 
 
 def make_configuration(number: int) -> dict[str, Any]:
@@ -203,7 +206,7 @@ def _list_table(seeds: Sequence[int]) -> list[Job]:
             test_every=100,
         )
         for name, (learner, settings) in _TEAMS.items()
-        for seed in seeds
+        for seed in (seeds if name == HELD else seeds[:N_PEER_SEEDS])
         for number in range(N_CONFIGURATIONS)
     ]
 
@@ -220,7 +223,7 @@ def _conclude_table(runs: Runs, n_seeds: int) -> list[Finding]:
             rate = hits / len(results)
             claim = f"{words}, share of {N_CONFIGURATIONS} configurations, {name}"
             check = Check(claim, rate, 0.65, ">=")
-            is_held = name == "d-rr-ql" and measure == "n_f"
+            is_held = name == HELD and measure == "n_f"
             interval = compute_rate_interval(hits, len(results))
             said = thesis.get(name, ("", ""))[place]
             findings.append(
@@ -228,14 +231,15 @@ def _conclude_table(runs: Runs, n_seeds: int) -> list[Finding]:
             )
     both = [
         (one["s_b"], other["s_b"])
-        for one, other in zip(runs["d-rr-ql"], runs["d-ql"], strict=True)
+        for one, other in zip(runs["d-rr-ql"], runs["d-ql"], strict=False)
         if one["s_b"] is not None and other["s_b"] is not None
     ]
     if both:
         equal = float(np.mean([one == other for one, other in both]))
         interval = compute_rate_interval(round(equal * len(both)), len(both))
         claim = f"best policies equally long, share of the {len(both)} where both have one"
-        findings.append(Finding(claim, "all of 4", equal, interval, n_seeds))
+        n_own = min(n_seeds, N_PEER_SEEDS)
+        findings.append(Finding(claim, "all of 4", equal, interval, n_own))
     return findings
 
 

@@ -47,7 +47,10 @@ def draw_allowed(allowed, stream):  # type: ignore[no-untyped-def]
 
 @jitable
 def find_best(scores, allowed):  # type: ignore[no-untyped-def]
-    """Returns, as bits, the allowed actions with the highest score (n_actions,)."""
+    """Returns, as bits, the allowed actions with the highest score (n_actions,).
+
+    All of them where no score is a number, as after rewards beyond the range of floats.
+    """
     best = 0
     highest = -math.inf
     for action in range(scores.shape[0]):
@@ -57,7 +60,7 @@ def find_best(scores, allowed):  # type: ignore[no-untyped-def]
                 best = 0
             if scores[action] == highest:
                 best |= 1 << action
-    return best
+    return best if best else allowed
 
 
 @jitable

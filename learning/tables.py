@@ -62,7 +62,8 @@ def probe(keys, key):  # type: ignore[no-untyped-def]
     last = keys.shape[0] - 1
     # Odd factors below 2^30, so that nothing overflows and plain Python finds the same slot.
     mixed = (key & 0xFFFFFFFF) * 0x2E3779B1 + (key >> 32) * 0x25EBCA77
-    slot = (mixed >> 22 ^ mixed >> 37) & last
+    mixed = ((mixed ^ mixed >> 31) & 0x7FFFFFFF) * 0x2545F491
+    slot = mixed >> 20 & last
     while keys[slot] != _FREE and keys[slot] != key + 1:
         slot = (slot + 1) & last
     return slot

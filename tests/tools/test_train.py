@@ -118,6 +118,15 @@ def test_an_interrupted_run_goes_on_to_its_own_end(call, tmp_path, monkeypatch, 
     assert tables[0] == tables[1]
 
 
+@pytest.fixture
+def interruptible():
+    """Ctrl-C as in a terminal; a process started in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_a_second_interrupt_stops_at_once():
     before = signal.getsignal(signal.SIGINT)
 
@@ -206,7 +215,7 @@ def test_epsilon_by_default(task, words, expected):
         (("maze", "--moves", "0"), "moves is 0"),
         (("maze", "--tests", "0"), "tests is 0"),
         (("maze", "--seed", "-1"), "seed is -1"),
-        (("maze", "--values", "moon"), "values is 'moon'; valid: one of goal, monolithic"),
+        (("maze", "--values", "moon"), "values is 'moon'; valid: one of goal, local, monolithic"),
         (("maze", "--vetoes", "moon"), "vetoes is 'moon'; valid: one of none"),
         (("maze", "--set", "moon=1"), "option of maze is 'moon'"),
         (("maze", "--set", "start"), "option is 'start'; valid: name=value"),

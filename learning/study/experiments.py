@@ -104,52 +104,58 @@ def _conclude_experiment_a(runs: Runs, n_seeds: int) -> list[Finding]:
 
 # Figure 5.3: one agent, four robots, 17 steps.
 
-CHAIN = ((8, 0), (6, 0), (4, 0), (2, 0))
-CHAIN_GOAL = (5, 8)
-"""A straight hose, and a goal from which breadth-first search finds an optimum of 17 steps."""
+HOSES: dict[str, dict[str, Any]] = {
+    "bent hose": {"start": ((9, 2), (6, 2), (4, 1), (2, 0)), "goal": (3, 8)},
+    "straight hose": {"start": ((8, 0), (6, 0), (4, 0), (2, 0)), "goal": (5, 8)},
+}
+"""Two configurations, which the thesis does not give, with an optimum of 17 steps by search. Chance
+alone finds the goal of the first in 4 % of the first 15,000 episodes, of the second in 2 %."""
+_WAYS: dict[str, tuple[str, dict[str, Any]]] = {
+    "safe-msav, alpha = 1": ("safe-msav", {"learning_rate": 1.0}),
+    "safe-msav, alpha = 0.25": ("safe-msav", {"learning_rate": 0.25}),
+    "monolithic": ("q-learning", {"learning_rate": 0.25, "vetoes": "monolithic"}),
+}
 
 
 def _list_17(seeds: Sequence[int]) -> list[Job]:
-    ways: dict[str, tuple[str, dict[str, Any]]] = {
-        "safe-msav, alpha = 1": ("safe-msav", {"learning_rate": 1.0}),
-        "safe-msav, alpha = 0.25": ("safe-msav", {"learning_rate": 0.25}),
-        "monolithic": ("q-learning", {"learning_rate": 0.25, "vetoes": "monolithic"}),
-    }
     return [
         Job(
-            name=name,
+            name=f"{name}, {hose}",
             task="line-single-agent",
-            options={"n_robots": 4, "start": CHAIN, "goal": CHAIN_GOAL},
+            options={"n_robots": 4, **options},
             learner=learner,
             settings={**settings, "exploration": {"per_episode": 1 / 75_000}},
             seed=seed,
             episodes=75_000,
         )
-        for name, (learner, settings) in ways.items()
+        for hose, options in HOSES.items()
+        for name, (learner, settings) in _WAYS.items()
         for seed in seeds
     ]
 
 
 def _conclude_17(runs: Runs, n_seeds: int) -> list[Finding]:
-    task = make_task("line-single-agent", n_robots=4, start=CHAIN, goal=CHAIN_GOAL)
-    start = task.reset(make_stream(np.random.default_rng(0)))
-    optimum = find_shortest(task, start)
-    found = float("nan") if optimum is None else float(optimum)
-    searched = Check("steps of the optimum, by search", found, 17, "==")
-    findings = [
-        Finding("steps of the optimum, by search", "17", found, (found, found), 1, searched)
-    ]
-    for name in ("safe-msav, alpha = 1", "safe-msav, alpha = 0.25"):
-        steps = [r["test_moves"] if r["test_success"] else np.inf for r in runs[name]]
-        claim = f"steps of the greedy policy, {name}"
-        check = Check(f"{claim}: worst of {n_seeds} seeds", float(max(steps)), found, "<=")
-        ours, interval = _summarize(steps)
-        is_held = name.endswith("= 1")
-        findings.append(Finding(claim, "17", ours, interval, n_seeds, check if is_held else None))
-    rates = [run["success_rate"] for run in runs["monolithic"]]
-    interval = compute_mean_interval(rates)
-    claim = "success of the last tenth, monolithic Q-learning and vetoes"
-    findings.append(Finding(claim, "never above .01", float(np.mean(rates)), interval, n_seeds))
+    findings = []
+    for hose, options in HOSES.items():
+        task = make_task("line-single-agent", n_robots=4, **options)
+        optimum = find_shortest(task, task.reset(make_stream(np.random.default_rng(0))))
+        found = float("nan") if optimum is None else float(optimum)
+        claim = f"steps of the optimum by search, {hose}"
+        check = Check(claim, found, 17, "==")
+        findings.append(Finding(claim, "17", found, (found, found), 1, check))
+        for way in list(_WAYS)[:2]:
+            results = runs[f"{way}, {hose}"]
+            steps = [r["test_moves"] if r["test_success"] else np.inf for r in results]
+            claim = f"steps of the greedy policy, {way}, {hose}"
+            check = Check(f"{claim}: worst of {n_seeds} seeds", float(max(steps)), found, "<=")
+            is_held = way.endswith("= 1") and hose == "bent hose"
+            ours, interval = _summarize(steps)
+            limit = check if is_held else None
+            findings.append(Finding(claim, "17", ours, interval, n_seeds, limit))
+        rates = [run["success_rate"] for run in runs[f"monolithic, {hose}"]]
+        claim = f"success of the last tenth, monolithic Q-learning and vetoes, {hose}"
+        mean, interval = float(np.mean(rates)), compute_mean_interval(rates)
+        findings.append(Finding(claim, "never above .01", mean, interval, n_seeds))
     return findings
 
 
@@ -293,7 +299,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     ),
     "fig-5.3": Experiment(
         "one agent moves four robots: 17 steps",
-        "a straight hose as the start; all constraints are modules, not stretch alone",
+        "start and goal are ours; all constraints are modules, not stretch alone",
         _list_17,
         _conclude_17,
     ),

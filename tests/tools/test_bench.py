@@ -8,7 +8,7 @@ import json
 import pytest
 
 from hose_mj.checks import Check
-from tools import bench, bench_env, bench_hose, cli
+from tools import bench, bench_env, bench_hose, bench_learn, cli
 from tools.bench_records import Bench, Record, measure_rate
 
 RECORD = {"group", "name", "value", "unit", "peer", "ratio"}
@@ -34,11 +34,11 @@ def short(monkeypatch):
     def measure(work, rounds, seconds, *clock):
         return measure_rate(work, 1, 1e-3, *clock)
 
-    for group in (bench_env, bench_hose):
+    for group in (bench_env, bench_hose, bench_learn):
         monkeypatch.setattr(group, "measure_rate", measure)
 
 
-@pytest.mark.parametrize(("group", "n_checks"), [("env", 3), ("hose", 0)])
+@pytest.mark.parametrize(("group", "n_checks"), [("env", 3), ("hose", 0), ("learn", 7)])
 def test_the_document(capsys, short, group, n_checks):
     status = cli.main(["bench", group, "--quick", "--json", "--seed", "4"])
     captured = capsys.readouterr()

@@ -3,6 +3,8 @@
 VENV ?= .venv
 PYTHON ?=
 PYTEST_ARGS ?=
+# Tests run in this many processes, the tests of a file in one of them.
+PYTEST_WORKERS ?= 2
 
 BIN := $(VENV)/bin
 # One stamp per set of packages: installing again only after these two files changed.
@@ -35,7 +37,7 @@ demo: $(CORE)
 	$(BIN)/hose-mj compare garden_hose --out out/demo/garden_hose || test $$? -eq 1
 
 test: lint
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses $(PYTEST_WORKERS) --dist loadfile $(PYTEST_ARGS)
 
 test-slow: $(DEV)
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)

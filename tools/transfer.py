@@ -41,6 +41,8 @@ class Args:
     """Greedy learning episodes on the target."""
     configurations: int = 30
     """How often all this is done."""
+    values: str = "goal"
+    """What the goal modules see: goal (on a line, all robots' formation), local or monolithic."""
     exchange: tuple[float, ...] = (390_000.0, 1.0)
     """What a move on the target costs, in moves on the source; the thesis's, and equal cost."""
     json: bool = False
@@ -99,6 +101,7 @@ def _run_all(args: Args) -> list[Outcome]:
         moves=args.moves,
         episodes=args.episodes,
         exchange=args.exchange,
+        values=args.values,
     )
     with compile_notice("learner's kernels"):  # a short trial has everything compiled
         run_trial(replace(plan, moves=1), np.random.default_rng(0))

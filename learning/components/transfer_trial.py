@@ -37,6 +37,7 @@ class Plan:
         moves: of training on the source.
         episodes: greedy learning episodes on the target.
         exchange: what a move on the target costs, in moves on the source; a control for each.
+        values: what the goal modules see (`learning.presets.VALUES`).
     """
 
     source: str
@@ -46,6 +47,7 @@ class Plan:
     moves: int
     episodes: int
     exchange: tuple[float, ...]
+    values: str = "goal"
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,8 @@ def run_trial(plan: Plan, generator: np.random.Generator) -> Outcome:
         InputError: tasks that do not fit.
     """
     source_task, target_task = make_tasks(plan, generator)
-    source = _make(source_task, Exploration(per_success=PER_SUCCESS), generator)
-    target = _make(target_task, Exploration(epsilon=0.0), generator)
+    source = _make(plan, source_task, Exploration(per_success=PER_SUCCESS), generator)
+    target = _make(plan, target_task, Exploration(epsilon=0.0), generator)
     match_modules(source, target)  # better now than after the training
     source.advance(moves=plan.moves)
     modules = transfer(source, target)
@@ -91,7 +93,7 @@ def run_trial(plan: Plan, generator: np.random.Generator) -> Outcome:
     controls = []
     for rate in plan.exchange:
         moves = target.moves + int(plan.moves / rate)
-        control = _make(target_task, Exploration(), generator)
+        control = _make(plan, target_task, Exploration(), generator)
         found = control.advance(moves=moves).find_successes(target_task)
         controls.append((moves, bool(found.any())))
     return Outcome(
@@ -139,8 +141,10 @@ def _draw(task: Task, generator: np.random.Generator) -> dict[str, Any]:
     return drawn
 
 
-def _make(task: Task, exploration: Exploration, generator: np.random.Generator) -> Training:
-    settings = catalog.make_settings(LEARNER, task, exploration=exploration)
+def _make(
+    plan: Plan, task: Task, exploration: Exploration, generator: np.random.Generator
+) -> Training:
+    settings = catalog.make_settings(LEARNER, task, plan.values, exploration=exploration)
     return Training(task, LEARNER, settings, generator.spawn(1)[0])
 
 

@@ -18,6 +18,8 @@ _N = 200
 """Points of a piece between two holds."""
 _CHORD = 1e-4
 """Chords of this fraction of the length tell how a line bends where it begins."""
+_CLOSED = 1e-3
+"""Ends no further apart than this fraction of the length between them count as one place."""
 _AXES = np.eye(3)
 
 
@@ -120,7 +122,10 @@ def bend_between(ends: list[Array], tangents: list[Array], length: float, gravit
     chord = ends[1] - ends[0]
     u = np.linspace(0.0, 1.0, _N)[:, None]
     steps = (u**3 - 2 * u**2 + u, 3 * u**2 - 2 * u**3, u**3 - u**2)
-    side = _choose_side(chord, tangents, np.asarray(gravity, dtype=float))
+    # Ends that are all but in one place have no chord: then a loop leaves the tangent's line.
+    is_open = np.linalg.norm(chord) > _CLOSED * length
+    across = chord if is_open else tangents[0]
+    side = _choose_side(across, tangents, np.asarray(gravity, dtype=float))
     handle = length
 
     def curve(bend: float) -> Array:
@@ -164,8 +169,7 @@ def _hang(own: OwnHose, arc_length: float) -> Array:
 
 def _choose_side(chord: Array, tangents: list[Array], gravity: Array) -> Array:
     """The direction across a chord in which a slack hose hangs out: along gravity if it can."""
-    size = np.linalg.norm(chord)
-    along = chord / size if size > 0.0 else tangents[0]
+    along = chord / np.linalg.norm(chord)
     for aim in (gravity / (np.linalg.norm(gravity) or 1.0), tangents[0] - tangents[-1], *_AXES):
         across = aim - (aim @ along) * along
         if np.linalg.norm(across) > 0.05:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hose_mj.assets import find_asset
@@ -44,6 +44,7 @@ def test_a_curve_of_a_given_length_between_two_clamps(one, other, aim, share, gr
 
 
 @settings(deadline=None, max_examples=30)
+@example((0.0, 0.0, 1.0), (0.0, 1e-112, 0.0), 0.25)  # straight up from a clamp, and back to it
 @given(units, st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.floats(0.1, 0.9))
 def test_a_line_passes_its_holds_evenly(tangent, position, share):
     inside = HeldPlace(share * LENGTH, tuple(share * LENGTH * x for x in position), None)

@@ -21,6 +21,7 @@ from learning.study.training import Episodes
 from tools import train
 from tools.document import make_document, print_document
 from tools.progress import show_progress
+from tools.task_options import read_options
 
 Measured = npt.NDArray[np.float64]
 
@@ -60,6 +61,8 @@ class Args:
     """What to draw, a panel each: success, moves, return."""
     set: tuple[str, ...] = ()
     """Options of the task, as n_robots=3 goal=(2,1)."""
+    options: tuple[str, ...] = ()
+    """Options of the learners' own: trace_decay=0.8 for all, usap.classifier=forest for one."""
     episodes: int = 2_000
     """Episodes of each training."""
     bins: int = 50
@@ -133,12 +136,14 @@ def check_arguments(args: Args) -> None:
         valid = "different names out of " + ", ".join(known)
         if not given or len(set(given)) < len(given) or not set(given) <= set(known):
             raise InputError(name, given, valid)
+    read_options(args.options, args.learners)
 
 
 def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     """Trains once; returns the mean of each measure in each bin (bins,)."""
     shared = {field.name for field in fields(train.Args)} & {field.name for field in fields(Args)}
     given = {name: getattr(args, name) for name in shared - {"out", "json", "seed"}}
+    given["options"] = choose_options(args, learner)
     training = train.make_training(train.Args(**given, learner=learner, seed=seed))
     with compile_notice("learner's kernels"):
         training.advance(moves=0)
@@ -147,6 +152,12 @@ def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     parts = (np.array_split(np.asarray(value, float), args.bins) for value in values)
     means = (np.array([part.mean() for part in split]) for split in parts)
     return dict(zip(args.measures, means, strict=True))
+
+
+def choose_options(args: Args, learner: str) -> tuple[str, ...]:
+    """Chooses the options of one learner: its own, without its name, and those that name none."""
+    ours = (word.removeprefix(f"{learner}.") for word in args.options)
+    return tuple(word for word in ours if "." not in word.partition("=")[0])
 
 
 def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measured]]]) -> Panel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from learning.learners import catalog
 from tools import learning_curves, train
 from tools.cli import main
-from tools.learning_curves import Args, make_panel, measure
+from tools.learning_curves import Args, check_arguments, make_panel, measure
 
 FEW = ("--episodes", "40", "--bins", "4", "--seeds", "2")
 
@@ -72,6 +73,24 @@ def test_every_setting_reaches_the_training(monkeypatch):
     assert {name: getattr(seen[0], name) for name in given} == given
 
 
+def test_options_are_for_all_learners_or_for_the_one_they_name(monkeypatch):
+    seen = {}
+
+    def remember(args):
+        seen[args.learner] = args.options
+        return train_once(replace(args, options=()))
+
+    train_once = train.make_training
+    monkeypatch.setattr(learning_curves.train, "make_training", remember)
+    ids = ("d-rr-ql", "q-learning")
+    words = ("a=1.5", "q-learning.b=2", "d-rr-ql.c=(0.5, 3)")
+    args = Args(task="maze", learners=ids, options=words, episodes=2, bins=1)
+    check_arguments(args)
+    for id in ids:
+        measure(args, id, 0)
+    assert seen == {"d-rr-ql": ("a=1.5", "c=(0.5, 3)"), "q-learning": ("a=1.5", "b=2")}
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [
@@ -82,6 +101,8 @@ def test_every_setting_reaches_the_training(monkeypatch):
         (("--bins", "50", "--episodes", "40"), "bins"),
         (("--seed", "-1"), "seed"),
         (("--set", "size=3"), "size"),
+        (("--options", "trace_decay=0.8"), "trace_decay"),
+        (("--options", "usap.capacity=10"), "usap.capacity"),
         (("--vetoes", "all"), "vetoes"),
     ],
 )

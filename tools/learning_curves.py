@@ -80,7 +80,7 @@ class Args:
     discount: float | None = None
     """Gamma."""
     values: str | None = None
-    """What the value modules see, of all learners: goal or monolithic."""
+    """What the value modules see, of all learners: goal, local or monolithic."""
     vetoes: str | None = None
     """What vetoes, for all learners: none, modules, monolithic, thresholds or values."""
     title: str | None = None

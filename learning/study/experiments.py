@@ -232,9 +232,9 @@ def _conclude_table(runs: Runs, n_seeds: int) -> list[Finding]:
             is_held = name == HELD and measure == "n_f"
             interval = compute_rate_interval(hits, len(results))
             said = thesis.get(name, ("", ""))[place]
-            findings.append(
-                Finding(claim, said, rate, interval, n_seeds, check if is_held else None)
-            )
+            n_own = n_seeds if name == HELD else min(n_seeds, N_PEER_SEEDS)
+            limit = check if is_held else None
+            findings.append(Finding(claim, said, rate, interval, n_own, limit))
     both = [
         (one["s_b"], other["s_b"])
         for one, other in zip(runs["d-rr-ql"], runs["d-ql"], strict=False)

@@ -30,8 +30,9 @@ from learning.learners.round_robin import add_rewards, finish, meet
 from learning.records import Learner, Memory
 from learning.settings import LearnerSettings, check_range, get_options
 
-OPTIONS: dict[str, float | str] = {"classifier": "tree", "minimum": 5, "capacity": 100}
-"""See `learning.components.usap.UndesiredPredictor`."""
+OPTIONS: dict[str, float | str] = {"classifier": "tree", "minimum": 5, "capacity": 1000}
+"""See `learning.components.usap.UndesiredPredictor`. The thesis keeps 100 instances of each action
+and class, from which the classifier vetoes a quarter of the safe moves of the taxi."""
 
 
 class Usap(NamedTuple):

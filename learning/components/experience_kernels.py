@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hose_mj.compiled import compiled, jitable
+from hose_mj.compiled import compiled
 from hose_mj.tasks.kernels import (
     TURN,
     Floats,
@@ -17,7 +17,7 @@ from hose_mj.tasks.kernels import (
     observe,
     reset,
 )
-from hose_mj.tasks.stream import draw_below
+from learning.policies import draw_allowed
 
 
 class Rows(NamedTuple):
@@ -41,22 +41,6 @@ class Rows(NamedTuple):
     next_values: Integers
 
 
-@jitable
-def draw_available(available, stream):  # type: ignore[no-untyped-def]
-    """Draws one of the actions given as bits, all equally likely."""
-    count = 0
-    rest = available
-    while rest:
-        rest &= rest - 1
-        count += 1
-    for _ in range(draw_below(stream, count)):
-        available &= available - 1
-    action = 0
-    while available >> action & 1 == 0:
-        action += 1
-    return action
-
-
 @compiled
 def fill_rows(record, state, stream, rows):  # type: ignore[no-untyped-def]
     """Plays random available actions, agents in turn, until all rows are written.
@@ -70,7 +54,7 @@ def fill_rows(record, state, stream, rows):  # type: ignore[no-untyped-def]
     for k in range(rows.agents.shape[0]):
         agent = state[TURN]
         observe(record, state, agent, rows.values[k])
-        action = draw_available(mask(record, state, agent), stream)
+        action = draw_allowed(mask(record, state, agent), stream)
         events = apply(record, state, agent, action)
         rows.agents[k] = agent
         rows.actions[k] = action

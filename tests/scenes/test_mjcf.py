@@ -32,6 +32,11 @@ def make_robot(prefix, x, body="", inside=""):
     </body>"""
 
 
+def make_order(*sites):
+    elements = "".join(f'<element objtype="site" objname="{site}"/>' for site in sites)
+    return f'<tuple name="hose_robots">{elements}</tuple>'
+
+
 SITES = '<site name="hose_source"/><site name="goal" pos="1 1 0"/>'
 ROBOTS = make_robot("r0/", 1.8) + make_robot("r1/", 0.9)
 
@@ -122,8 +127,7 @@ def test_robots_are_numbered_from_the_tip_by_their_names(write):
 
 def test_a_tuple_numbers_robots_whose_names_do_not(write):
     robots = make_robot("near/", 0.5) + make_robot("far/", 1.5)
-    order = """<tuple name="hose_robots"><element objtype="site" objname="far/hose_attach"/>
-      <element objtype="site" objname="near/hose_attach"/></tuple>"""
+    order = make_order("far/hose_attach", "near/hose_attach")
     scene = read_scene(write(make_scene(robots=robots, custom=order)))
     assert [r.name for r in scene.robots] == ["far", "near"]
 
@@ -166,7 +170,7 @@ MISTAKES = [
         "site r2/hose_attach is 'world'; valid: in a body that joints let move",
     ),
     (
-        make_scene(sites='<site name="goal"/>', robots=make_robot("", 1, inside=SITES[:27])),
+        make_scene(sites='<site name="goal"/>', robots=make_robot("", 1, inside=SITES[:26])),
         "site hose_source is 'body'; valid: in a body that cannot move",
     ),
     (SCENE.replace("r1/", "r2/"), "number of the robot with site r2/hose_attach is 2; valid: each"),
@@ -176,9 +180,7 @@ MISTAKES = [
         "number of the robot with site b0/hose_attach is 0; valid: each of 0 (tip) to 1",
     ),
     (
-        make_scene(
-            custom='<tuple name="hose_robots"><element objtype="site" objname="goal"/></tuple>'
-        ),
+        make_scene(custom=make_order("goal")),
         "tuple hose_robots is ['goal']; valid: each of the sites r0/hose_attach, r1/",
     ),
     (
@@ -194,7 +196,10 @@ MISTAKES = [
         "distance of site goal is 2.828427; valid: at most 2 m from the source, the whole hose",
     ),
     (make_scene(custom=number("hose_friction", -1)), "numeric hose_friction is -1.0; valid: one"),
-    (make_scene(custom=number("hose_friction", "nan")), "friction: data is nan; valid: a finite"),
+    (
+        make_scene(custom=number("hose_friction", "nan")),
+        "hose_friction> data (line 8) is 'nan'; valid: fini",
+    ),
     (make_scene(custom=number("bounds", "1 2 3")), "numeric bounds is (1.0, 2.0, 3.0); valid: x"),
     (make_scene(custom=number("bounds", "1 1 0 2")), "numeric bounds is (1.0, 1.0, 0.0, 2.0)"),
     (
@@ -217,11 +222,16 @@ MISTAKES = [
     (make_scene(custom=number("hose_inner_radius", 0.01)), "hose_inner_radius is 0.01; valid: bel"),
     (make_scene("<numeric name='hose_length' data='2'/>"), "numeric hose_axial_stiffness is None"),
     (make_scene(""), "numeric hose_length is None; valid: <custom><numeric name='hose_length'"),
-    (make_scene(head='<option timestep="nan"/>'), "<option> timestep is nan; valid: a finite num"),
+    (make_scene(head='<option timestep="nan"/>'), "<option> timestep (line 1) is 'nan'; valid: f"),
     (make_scene(head='<option timestep="-1"/>'), "<option> timestep is -1.0; valid: a finite num"),
     (make_scene(head='<option timestep="0"/>'), "<option> timestep is 0.0; valid: a finite numbe"),
-    (make_scene(head='<option gravity="0 inf 0"/>'), "<option> gravity is inf; valid: a finite"),
-    (SCENE.replace('mass="1"', 'mass="nan"', 1), "body r0/body: mass is nan; valid: a finite"),
+    (make_scene(head='<option gravity="0 inf 0"/>'), "<option> gravity (line 1) is '0 inf 0'; v"),
+    (
+        SCENE.replace('mass="1"', 'mass="nan"', 1),
+        "<geom> mass (line 12) is 'nan'; valid: finite nu",
+    ),
+    (SCENE.replace('mass="1"', 'mass="-1"', 1), "valid: MJCF that MuJoCo 3."),
+    (SCENE.replace('size="0.05"', 'size="1e200"', 1), "body r0/body: inertia is inf; valid: a fi"),
     (SCENE.replace('mass="1"', 'mass="0"', 1), "mass and inertia of moving bodies must be larger"),
     (
         SCENE.replace('type="slide"', 'type="slide" stiffness="-2"', 1),

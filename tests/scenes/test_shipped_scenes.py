@@ -60,7 +60,7 @@ def test_motors_move_each_robot(scenes, name):
 
 @pytest.mark.parametrize("n", range(1, 7))
 def test_the_floor_is_the_line_tasks(scenes, n):
-    """21 x 21 cells of 5 cm, the source at the centre, the hose 16 cells long: the task is B.2's."""
+    """21 x 21 cells of 5 cm, the source at the centre, a hose of 16 cells: the task of B.2."""
     scene = scenes[f"floor_{n}"]
     assert len(scene.robots) == n
     assert scene.spec.length == pytest.approx(16 * CELL)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import NoReturn
 from xml.parsers import expat
@@ -23,6 +24,10 @@ LARGEST_ASSET = 20_000_000
 LARGEST_SCENE = 64_000_000
 """Bytes of all files together."""
 MOST_FILES = 200
+MOST_FOLDERS = 8
+"""Folders of assets."""
+MOST_NAMED = 1000
+"""Elements that name a file."""
 MOST_ELEMENTS = 20_000
 """In all XML files together."""
 DEEPEST = 64
@@ -71,20 +76,14 @@ def read_files(path: Path) -> SceneFiles:
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError("file", shorten(str(path)), f"a file to be read ({error})") from error
     _read_xml(files, files.path, "file")
-    done = 0
-    while done < len(files.wanted):
-        # Each file may name more files and folders, so all are looked up in what is known by then.
-        where, is_xml, name, namer = files.wanted[done]
-        done += 1
-        found = _find(files, where, name, namer)
-        for file in found:
-            if file in files.contents:
-                continue
-            if is_xml:
-                _read_xml(files, file, where)
-            else:
-                _read(files, file, where, LARGEST_ASSET)
-    for where, _, name, namer in files.wanted:  # folders named late are looked into as well
+    known = 0
+    while known != len(files.contents):  # each file may name more files, and folders to look into
+        known = len(files.contents)
+        for where, is_xml, name, namer in list(files.wanted):
+            for file in _find(files, where, name, namer) if is_xml else ():
+                if file not in files.contents:
+                    _read_xml(files, file, where)
+    for where, _, name, namer in files.wanted:
         for file in _find(files, where, name, namer):
             if file not in files.contents:
                 _read(files, file, where, LARGEST_ASSET)
@@ -102,9 +101,10 @@ def _find(files: SceneFiles, where: str, name: str, namer: Path) -> list[Path]:
     folder = files.path.parent
     found = []
     for base in dict.fromkeys((folder, namer.parent)):
-        for inner in files.folders:
+        # With <compiler strippath="true"/> a file's folder does not count.
+        for inner, tail in product(files.folders, dict.fromkeys((name, Path(name).name))):
             try:
-                file = (base / inner / name).resolve()
+                file = (base / inner / tail).resolve()
                 is_there = file.exists()
             except (OSError, ValueError, RuntimeError) as error:
                 raise InputError(where, shorten(name), "a file in the scene's folder") from error
@@ -196,10 +196,14 @@ class _Reader:
             where = _name_attribute(tag, name, key)
             self._check_inside(where, value)
             if is_folder:
-                self._files.folders.append(value)
+                self._files.folders = list(dict.fromkeys((*self._files.folders, value)))
             elif value:
                 place = f"{shorten(self._file.name)}: {where}"
                 self._files.wanted.append((place, tag in _XML, value, self._file))
+            if len(self._files.folders) > MOST_FOLDERS:
+                self._fail(where, value, f"at most {MOST_FOLDERS} folders of assets")
+            if len(self._files.wanted) > MOST_NAMED:
+                self._fail(where, value, f"at most {MOST_NAMED} elements that name files")
 
     def _check_finite(self, tag: str, name: str, key: str, value: str) -> None:
         """Refuses NaN, which MuJoCo takes for "not given", and infinities."""

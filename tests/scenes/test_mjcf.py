@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.scenes import mjcf_probe
+from hose_mj.scenes import mjcf_files, mjcf_probe
 from hose_mj.scenes.mjcf import find_scene, read_scene
-from hose_mj.scenes.mjcf_files import DEEPEST, LARGEST_XML, MOST_ELEMENTS, read_files
+from hose_mj.scenes.mjcf_files import DEEPEST, LARGEST_XML, MOST_ELEMENTS, MOST_NAMED, read_files
 
 HOSE = """
     <numeric name="hose_length" data="2"/>
@@ -198,7 +198,7 @@ MISTAKES = [
     (make_scene(custom=number("hose_friction", -1)), "numeric hose_friction is -1.0; valid: one"),
     (
         make_scene(custom=number("hose_friction", "nan")),
-        "hose_friction> data (line 8) is 'nan'; valid: fini",
+        "data (line 8) is 'nan'; valid: f",
     ),
     (make_scene(custom=number("bounds", "1 2 3")), "numeric bounds is (1.0, 2.0, 3.0); valid: x"),
     (make_scene(custom=number("bounds", "1 1 0 2")), "numeric bounds is (1.0, 1.0, 0.0, 2.0)"),
@@ -228,7 +228,7 @@ MISTAKES = [
     (make_scene(head='<option gravity="0 inf 0"/>'), "<option> gravity (line 1) is '0 inf 0'; v"),
     (
         SCENE.replace('mass="1"', 'mass="nan"', 1),
-        "<geom> mass (line 12) is 'nan'; valid: finite nu",
+        "<geom> mass (line 12) is 'nan'; valid: finite",
     ),
     (SCENE.replace('mass="1"', 'mass="-1"', 1), "valid: MJCF that MuJoCo 3."),
     (SCENE.replace('size="0.05"', 'size="1e200"', 1), "body r0/body: inertia is inf; valid: a fi"),
@@ -296,6 +296,14 @@ HOSTILE = [
         "<mujoco>" + "<size/>" * MOST_ELEMENTS + "</mujoco>",
         f"number of elements (line 1) is '{MOST_ELEMENTS + 1}'; valid: at most {MOST_ELEMENTS}",
     ),
+    (
+        "<mujoco>" + "<compiler meshdir='%d'/>" * 9 % tuple(range(9)) + "</mujoco>",
+        "<compiler> meshdir (line 1) is '7'; valid: at most 8 folders of assets",
+    ),
+    (
+        "<mujoco>" + "<model file='a'/>" * (MOST_NAMED + 1) + "</mujoco>",
+        f"<model> file (line 1) is 'a'; valid: at most {MOST_NAMED} elements that name files",
+    ),
     (BOMB, "<!DOCTYPE> (line 1) is 'a'; valid: XML without document type and entities"),
     (b"<mujoco>" + b" " * LARGEST_XML + b"</mujoco>", f"a file of at most {LARGEST_XML} bytes"),
     ("<robot name='a'/>", "first element (line 1) is 'robot'; valid: mujoco (MJCF)"),
@@ -322,6 +330,29 @@ def test_links_out_of_the_folder_are_refused(write, tmp_path):
     (path.parent / "sub").symlink_to(outside.parent)
     path.write_text("<mujoco><include file='sub/a.xml'/></mujoco>")
     assert "valid: a file in the scene's folder, not a link" in complain(path)
+
+
+TETRAHEDRON = """v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1
+f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"""
+
+
+def test_meshes_are_found_in_folders_that_an_include_names(write):
+    write(TETRAHEDRON, "meshes/a.obj")
+    write("<mujoco><compiler meshdir='meshes'/></mujoco>", "parts/c.xml")
+    head = "<include file='parts/c.xml'/><asset><mesh name='m' file='a.obj'/></asset>"
+    mesh = '<geom type="mesh" mesh="m" pos="0 0 5"/>'
+    path = write(make_scene(sites=SITES + mesh, head=head))
+    scene = read_scene(path)
+    assert scene.make_spec().compile().nmesh == 1
+    write(TETRAHEDRON.replace("v 1 0 0", "v 2 0 0"), "meshes/a.obj")
+    assert read_files(path).digest != scene.digest
+
+
+def test_an_oversize_asset_is_refused(write, monkeypatch):
+    monkeypatch.setattr(mjcf_files, "LARGEST_ASSET", 50)
+    write(TETRAHEDRON, "a.obj")
+    message = complain(write(make_mesh("file='a.obj'")))
+    assert message == "mine.xml: <mesh m> file is 'a.obj'; valid: a file of at most 50 bytes"
 
 
 def test_an_include_is_read_with_the_same_rules(write):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -13,7 +14,9 @@ from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes import mjcf_files, mjcf_probe
 from hose_mj.scenes.mjcf import find_scene, read_scene
 from hose_mj.scenes.mjcf_files import DEEPEST, LARGEST_XML, MOST_ELEMENTS, MOST_NAMED, read_files
+from hose_mj.scenes.mjcf_hose import HOSE_NUMERICS
 
+ROOT = Path(__file__).resolve().parents[2]
 HOSE = """
     <numeric name="hose_length" data="2"/>
     <numeric name="hose_radius" data="0.01"/>
@@ -141,6 +144,19 @@ def test_the_start_is_the_keyframe_of_that_name(write):
     head = '<keyframe><key name="start" qpos="-0.1 0.05"/></keyframe>'
     scene = read_scene(write(make_scene(head=head)))
     assert [r.position[0] for r in scene.robots] == pytest.approx([1.7, 0.95])
+
+
+def test_the_example_of_the_documentation(write):
+    text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+    example = text.split("```xml\n")[1].split("```")[0]
+    scene = read_scene(write(example))
+    assert [r.name for r in scene.robots] == ["robot0", "robot1"]
+    assert scene.make_spec().compile().nu == 4
+
+
+def test_the_documentation_names_every_numeric():
+    text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+    assert not [name for name in HOSE_NUMERICS if f"`{name}`" not in text]
 
 
 def test_the_longest_spans_are_allowed(write):
@@ -409,8 +425,9 @@ def test_a_crash_and_a_hang_become_errors(write, monkeypatch, tmp_path):
         assert what in complain(path)
 
 
+# Most numbers replaced leave the file well formed, so that it reaches MuJoCo.
 mutation = st.tuples(
-    st.sampled_from(["flip", "cut", "double", "insert", "number"]),
+    st.sampled_from(["number", "number", "number", "digit", "flip", "cut", "double", "insert"]),
     st.floats(0, 1),
     st.integers(1, 40),
     st.one_of(
@@ -420,13 +437,17 @@ mutation = st.tuples(
 )
 
 
+NUMBERS = (b"-1", b"0", b"7", b"1e308", b"-1e-300", b"1e10", b"1e5", b"0.3", b"1 2", b"3 x", b"")
+
+
 def mutate(data, changes):
     for kind, where, size, junk in changes:
         k = int(where * len(data))
-        if kind == "number":
+        if kind in ("number", "digit"):
             digits = [i for i, c in enumerate(data) if chr(c).isdigit()]
             k = digits[int(where * (len(digits) - 1))] if digits else k
-            data = data[:k] + junk + data[k + 1 :]
+            what = junk if kind == "digit" else NUMBERS[size % len(NUMBERS)]
+            data = data[:k] + what + data[k + 1 :]
         elif kind == "flip":
             data = data[:k] + junk + data[k + len(junk) :]
         elif kind == "cut":

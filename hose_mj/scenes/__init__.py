@@ -1,1 +1,1 @@
-"""What a user describes in files: materials and hoses in TOML."""
+"""What a user describes in files: materials and hoses in TOML, scenes in MJCF."""

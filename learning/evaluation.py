@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hose_mj.compiled import bitwise, jitable
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import STEPS, TURN
+from hose_mj.tasks.kernels import STEPS, TURN, Integers, dispatched
 from learning import rules
 from learning.loop import begin_episode, choose, see
 from learning.records import Memory
@@ -29,24 +29,6 @@ def _copy(value: Any) -> Any:
     if isinstance(value, tuple):
         return type(value)(*map(_copy, value))
     return value.copy() if isinstance(value, np.ndarray) else value
-
-
-@jitable
-def play_turn(task, learner, memory):  # type: ignore[no-untyped-def]
-    """Lets the agent whose turn it is make its greedy move; returns the events."""
-    agent = memory.state[TURN]
-    allowed = see(task, learner, memory, agent)
-    action = choose(task, learner, memory, agent, allowed, False)
-    return kernels.apply(task, memory.state, agent, action)
-
-
-@jitable
-def play_joint(task, learner, memory):  # type: ignore[no-untyped-def]
-    """Lets all agents make their greedy moves at once; returns the events."""
-    for agent in range(memory.actions.shape[0]):
-        memory.allowed[agent] = see(task, learner, memory, agent)
-    rules.choose_joint(learner.rule, task, learner, memory, False)
-    return kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
 
 
 @jitable
@@ -83,11 +65,60 @@ def compose(task, learner, memory, start):  # type: ignore[no-untyped-def]
         state[k] = start[k]
 
 
+class Turns(NamedTuple):
+    """Agents that move one after the other."""
+
+
+class Joint(NamedTuple):
+    """Agents that learned to move at once."""
+
+
+class Composed(NamedTuple):
+    """Agents that learned in turns and move at once; a work array of the state's length."""
+
+    start: Integers
+
+
+@dispatched
+def play(manner: Any, task: Any, learner: Any, memory: Any) -> int:
+    """Makes the next greedy move, one agent's or a joint one, and returns the events."""
+    raise NotImplementedError(type(manner).__name__)
+
+
+@play.register(Turns)
+@jitable
+def play_turn(manner, task, learner, memory):  # type: ignore[no-untyped-def]
+    """The agent whose turn it is moves."""
+    agent = memory.state[TURN]
+    allowed = see(task, learner, memory, agent)
+    action = choose(task, learner, memory, agent, allowed, False)
+    return kernels.apply(task, memory.state, agent, action)
+
+
+@play.register(Joint)
+@jitable
+def play_joint(manner, task, learner, memory):  # type: ignore[no-untyped-def]
+    """All agents move at once."""
+    for agent in range(memory.actions.shape[0]):
+        memory.allowed[agent] = see(task, learner, memory, agent)
+    rules.choose_joint(learner.rule, task, learner, memory, False)
+    return kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
+
+
+@play.register(Composed)
+@jitable
+def play_composed(manner, task, learner, memory):  # type: ignore[no-untyped-def]
+    """All agents make the joint move that they agree on."""
+    compose(task, learner, memory, manner.start)
+    return kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
+
+
 @bitwise
-def test_turns(task, learner, memory, n_episodes, max_moves, results):  # type: ignore[no-untyped-def]
-    """Plays greedy episodes of agents in turns.
+def run_tests(manner, task, learner, memory, n_episodes, max_moves, results):  # type: ignore[no-untyped-def]
+    """Plays greedy episodes.
 
     Args:
+        manner: how the agents move, `Turns`, `Joint` or `Composed`.
         task: the task's kernel record.
         learner: the learner.
         memory: a probe (`make_probe`), changed in place.
@@ -99,34 +130,7 @@ def test_turns(task, learner, memory, n_episodes, max_moves, results):  # type: 
         begin_episode(task, memory)
         events = 0
         while memory.state[STEPS] < max_moves:
-            events = play_turn(task, learner, memory)
-            if kernels.is_over(task, events):
-                break
-        results[episode, 0], results[episode, 1] = memory.state[STEPS], events
-
-
-@bitwise
-def test_joint(task, learner, memory, n_episodes, max_moves, results):  # type: ignore[no-untyped-def]
-    """Plays greedy episodes of agents that move at once; arguments are those of `test_turns`."""
-    for episode in range(n_episodes):
-        begin_episode(task, memory)
-        events = 0
-        while memory.state[STEPS] < max_moves:
-            events = play_joint(task, learner, memory)
-            if kernels.is_over(task, events):
-                break
-        results[episode, 0], results[episode, 1] = memory.state[STEPS], events
-
-
-@bitwise
-def test_composed(task, learner, memory, start, n_episodes, max_moves, results):  # type: ignore[no-untyped-def]
-    """Plays episodes of composed joint moves; `start` is the work array of `compose`."""
-    for episode in range(n_episodes):
-        begin_episode(task, memory)
-        events = 0
-        while memory.state[STEPS] < max_moves:
-            compose(task, learner, memory, start)
-            events = kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
+            events = play(manner, task, learner, memory)
             if kernels.is_over(task, events):
                 break
         results[episode, 0], results[episode, 1] = memory.state[STEPS], events

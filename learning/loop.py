@@ -79,8 +79,8 @@ def choose(task, learner, memory, agent, allowed, explores):  # type: ignore[no-
 
 
 @jitable
-def veto(learner, memory, mover, agent, events):  # type: ignore[no-untyped-def]
-    """Vetoes the agent's last action where the events of the mover concern its modules (5.3)."""
+def veto(learner, memory, agent, events):  # type: ignore[no-untyped-def]
+    """Vetoes the agent's last action where the events concern its modules (section 5.3)."""
     for module in range(learner.veto_bases.shape[0]):
         concerned = learner.veto_actions[module] >> memory.actions[agent] & 1
         if concerned and events & learner.veto_events[module]:
@@ -104,7 +104,6 @@ def end_episode(task, learner, memory, log, events):  # type: ignore[no-untyped-
     row = log.used[0]
     log.episodes[row, 0] = memory.state[STEPS]
     log.episodes[row, 1] = events
-    log.episodes[row, 2] = events & task.violations
     log.returns[row] = memory.numbers[RETURN]
     log.used[0] = row + 1
     memory.counters[EPISODES] += 1
@@ -160,9 +159,9 @@ def run_turns(task, learner, memory, log, max_moves, max_episodes):  # type: ign
             if learner.shares_vetoes:
                 for other in range(memory.actions.shape[0]):
                     if memory.waited[other] >= 0:
-                        veto(learner, memory, agent, other, events)
+                        veto(learner, memory, other, events)
             else:
-                veto(learner, memory, agent, agent, events)
+                veto(learner, memory, agent, events)
         rules.gather(learner.rule, learner, memory, agent, action, events)
         is_over = kernels.is_over(task, events)
         if is_over or kernels.is_cut_off(task, memory.state):
@@ -214,7 +213,7 @@ def run_joint(task, learner, memory, log, max_moves, max_episodes):  # type: ign
         for agent in range(n_agents):
             if memory.charged[agent]:
                 count_events(task, learner, memory, memory.charged[agent])
-                veto(learner, memory, agent, agent, memory.charged[agent])
+                veto(learner, memory, agent, memory.charged[agent])
         is_over = kernels.is_over(task, events)
         if not is_over:
             for agent in range(n_agents):

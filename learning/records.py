@@ -21,8 +21,8 @@ MOVES, EPISODES, SUCCESSES, FRESH = 0, 1, 2, 3
 """Places in `Memory.counters`: moves of single agents, episodes ended, those with success, and
 whether the state has to be reset before the next move."""
 N_COUNTERS = 4
-N_LOGGED = 3
-"""Logged of an episode: its moves, the events that it ended with, and those of its violations."""
+N_LOGGED = 2
+"""Logged of an episode: its moves, and the events that it ended with."""
 
 
 class Learner(NamedTuple):
@@ -124,7 +124,7 @@ class Log(NamedTuple):
 
     Attributes:
         used: number of rows written (1,).
-        episodes: moves, last events, events that broke a constraint (capacity, N_LOGGED).
+        episodes: moves and last events (capacity, N_LOGGED).
         returns: sum of all rewards (capacity,).
     """
 

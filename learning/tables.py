@@ -20,8 +20,8 @@ LARGEST_DENSE = 2**21
 DENSE_WIDTH = 8
 """Longest rows of which there may be so many; of longer ones there may be fewer."""
 FIRST_CAPACITY = 2**14
-LARGEST_LOAD = 0.5
-"""Share of the slots that may be taken; beyond it the probes grow long."""
+SLOTS_PER_KEY = 2
+"""Slots for each key at least; with fewer the probes grow long."""
 _FREE = 0
 
 
@@ -95,7 +95,7 @@ def count_free(table):  # type: ignore[no-untyped-def]
     """Returns how many more keys may be claimed before the table has to grow."""
     if table.keys.shape[0] == 0:
         return 1 << 62
-    return table.keys.shape[0] // 2 - table.used[0]
+    return table.keys.shape[0] // SLOTS_PER_KEY - table.used[0]
 
 
 def is_sound(table: Table) -> bool:

@@ -45,7 +45,7 @@ MEASURES = {
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(train.LearnerArgs):
     """Train learners on a task with several seeds and draw what their training episodes came to.
 
     A line is the mean over the seeds, in bins of as many episodes each; the band around it goes
@@ -59,8 +59,6 @@ class Args:
     """The learners to compare."""
     measures: tuple[str, ...] = ("success",)
     """What to draw, a panel each: success, moves, return."""
-    set: tuple[str, ...] = ()
-    """Options of the task, as n_robots=3 goal=(2,1)."""
     options: tuple[str, ...] = ()
     """Options of the learners' own: trace_decay=0.8 for all, usap.classifier=forest for one."""
     episodes: int = 2_000
@@ -69,20 +67,6 @@ class Args:
     """Points of each line."""
     seeds: int = 5
     """Trainings of each learner."""
-    epsilon: float | None = None
-    """Share of random choices at the start."""
-    epsilon_per_episode: float | None = None
-    """What epsilon falls by after each episode."""
-    epsilon_per_success: float | None = None
-    """What epsilon falls by after each success."""
-    learning_rate: float | None = None
-    """Alpha."""
-    discount: float | None = None
-    """Gamma."""
-    values: str | None = None
-    """What the value modules see, of all learners: goal, local or monolithic."""
-    vetoes: str | None = None
-    """What vetoes, for all learners: none, modules, monolithic, thresholds or values."""
     title: str | None = None
     """Above the picture; by default the task and its options."""
     out: Path = Path("out/curves.png")
@@ -141,10 +125,18 @@ def check_arguments(args: Args) -> None:
 
 def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     """Trains once; returns the mean of each measure in each bin (bins,)."""
-    shared = {field.name for field in fields(train.Args)} & {field.name for field in fields(Args)}
-    given = {name: getattr(args, name) for name in shared - {"out", "json", "seed"}}
-    given["options"] = choose_options(args, learner)
-    training = train.make_training(train.Args(**given, learner=learner, seed=seed))
+    given = {field.name: getattr(args, field.name) for field in fields(train.LearnerArgs)}
+    own = choose_options(args, learner)
+    training = train.make_training(
+        train.Args(
+            **given,
+            task=args.task,
+            learner=learner,
+            options=own,
+            episodes=args.episodes,
+            seed=seed,
+        )
+    )
     with compile_notice("learner's kernels"):
         training.advance(moves=0)
     ended = training.advance(episodes=args.episodes)

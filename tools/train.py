@@ -32,28 +32,11 @@ SAVE_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
-class Args:
-    """Train a learner on a task, test it greedily, and keep both in a run folder.
+class LearnerArgs:
+    """What every command that trains lets a user set about task and learner."""
 
-    A run that was stopped, by Ctrl-C or otherwise, goes on with --resume from its last checkpoint,
-    exactly as if it had not been stopped.
-    """
-
-    task: Annotated[str, tyro.conf.Positional] = "line"
-    """A task: line, taxi, corridor, maze, ... (--list names all)."""
-    learner: str | None = None
-    """A learner; by default thresholded-msav on the line tasks and d-rr-ql on the others."""
-    list: bool = False
-    """List tasks and learners and stop."""
     set: tuple[str, ...] = ()
     """Options of the task, as n_robots=3 goal=(2,1)."""
-    options: tuple[str, ...] = ()
-    """Options of the learner's own, as trace_decay=0.8."""
-    episodes: int | None = None
-    """Episodes to train for, counted from the start of the run; the default depends on the task, or
-    with --resume on what the run was to end after."""
-    moves: int | None = None
-    """Moves of single agents after which training ends, if that comes first."""
     epsilon: float | None = None
     """Share of random choices at the start."""
     epsilon_per_episode: float | None = None
@@ -68,6 +51,29 @@ class Args:
     """What the value modules see: goal, local or monolithic; the default depends on the learner."""
     vetoes: str | None = None
     """What vetoes: none, modules, monolithic, thresholds or values; likewise."""
+
+
+@dataclass(frozen=True)
+class Args(LearnerArgs):
+    """Train a learner on a task, test it greedily, and keep both in a run folder.
+
+    A run that was stopped, by Ctrl-C or otherwise, goes on with --resume from its last checkpoint,
+    exactly as if it had not been stopped.
+    """
+
+    task: Annotated[str, tyro.conf.Positional] = "line"
+    """A task: line, taxi, corridor, maze, ... (--list names all)."""
+    learner: str | None = None
+    """A learner; by default thresholded-msav on the line tasks and d-rr-ql on the others."""
+    list: bool = False
+    """List tasks and learners and stop."""
+    options: tuple[str, ...] = ()
+    """Options of the learner's own, as trace_decay=0.8."""
+    episodes: int | None = None
+    """Episodes to train for, counted from the start of the run; the default depends on the task, or
+    with --resume on what the run was to end after."""
+    moves: int | None = None
+    """Moves of single agents after which training ends, if that comes first."""
     tests: int = 200
     """Greedy episodes after training."""
     out: Path | None = None

@@ -22,4 +22,4 @@ def add_vetoes(task, learner, memory, agent, action, events):  # type: ignore[no
     see(task, learner, memory, agent)
     keep_keys(learner, memory, agent)
     memory.actions[agent] = action
-    veto(learner, memory, agent, agent, events)
+    veto(learner, memory, agent, events)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -157,28 +155,6 @@ class UndesiredPredictor:
         """Returns the actions to avoid in what an agent sees, as bits; they may be all."""
         return int(compute_veto_mask(self.forest, values, agent))
 
-    def to_arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Returns copies of all that changes, to be saved and given to `restore`."""
-        return {name: array.copy() for name, array in self._list_arrays().items()}
-
-    def restore(self, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Goes back to what `to_arrays` returned, in place.
-
-        Raises:
-            InputError: arrays of a predictor with other options or another task.
-        """
-        own = self._list_arrays()
-        shapes = {name: array.shape for name, array in own.items()}
-        given = {name: np.shape(array) for name, array in arrays.items()}
-        if given != shapes:
-            raise InputError("shapes of a saved predictor", given, f"{shapes}")
-        for name, array in own.items():
-            array[...] = arrays[name]
-
-    def _list_arrays(self) -> dict[str, npt.NDArray[Any]]:
-        named = {**self.buffer._asdict(), **self.forest._asdict(), "stream": self.stream}
-        return {name: array for name, array in named.items() if isinstance(array, np.ndarray)}
-
 
 def _flatten(tree: Any, outputs: list[npt.NDArray[Any]]) -> None:
     """Writes a tree of scikit-learn into feature, threshold, left, right, undesired (n_nodes,)."""
@@ -191,37 +167,3 @@ def _flatten(tree: Any, outputs: list[npt.NDArray[Any]]) -> None:
     left[:] = grown.children_left
     right[:] = grown.children_right
     undesired[:] = grown.value[:, 0, 1]
-
-
-def compute_usap_policy(
-    q_values: Floats,
-    probabilities: Floats,
-    epsilon: float,
-    veto_probability: float = 0.5,
-) -> Floats:
-    """Returns the modified epsilon-greedy policy of Algorithm 8.2 as probabilities (n_actions,).
-
-    As printed, eq. 8.1 does not sum to 1, and its arg max runs over vetoed actions too. Here it is
-    epsilon-greedy among the actions that are not vetoed: each of them gets an equal share of
-    epsilon, and the best of them the rest, divided equally among ties. Where all are vetoed, which
-    the thesis leaves open, those with the least probability of breaking a constraint remain.
-
-    Args:
-        q_values: Q(s, a) (n_actions,).
-        probabilities: p(s, a) that an action breaks a constraint (n_actions,).
-        epsilon: share of exploration, 0 to 1.
-        veto_probability: from which on an action is vetoed.
-
-    Raises:
-        InputError: different lengths, or an epsilon outside 0 to 1.
-    """
-    if q_values.shape != probabilities.shape:
-        raise InputError("shape of the probabilities", probabilities.shape, f"{q_values.shape}")
-    if not (math.isfinite(epsilon) and 0.0 <= epsilon <= 1.0):
-        raise InputError("epsilon", epsilon, "a number from 0 to 1")
-    allowed = probabilities < veto_probability
-    if not allowed.any():
-        allowed = probabilities == probabilities.min()
-    best = allowed & (q_values == q_values[allowed].max())
-    policy: Floats = epsilon * allowed / allowed.sum() + (1.0 - epsilon) * best / best.sum()
-    return policy

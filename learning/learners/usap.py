@@ -32,7 +32,7 @@ from learning.settings import LearnerSettings, check_range, get_options
 
 OPTIONS: dict[str, float | str] = {"classifier": "tree", "minimum": 5, "capacity": 1000}
 """See `learning.components.usap.UndesiredPredictor`. The thesis keeps 100 instances of each action
-and class, from which the classifier vetoes a quarter of the safe moves of the taxi."""
+and class, with which the taxi is not learned."""
 
 
 class Usap(NamedTuple):

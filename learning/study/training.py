@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -185,12 +185,14 @@ class Training:
             raise InputError("manner", manner, f"{' or '.join(valid)} for {self.learner_id}")
         results = np.zeros((episodes, 2), np.int64)
         probe = evaluation.make_probe(self.memory)
-        arguments: list[Any] = [self.task.kernel, self.learner, probe]
-        if manner == "composed":
-            arguments.append(self.task.make_state())
-        kernel = getattr(evaluation, f"test_{manner}")
+        manners = {
+            "turns": evaluation.Turns(),
+            "joint": evaluation.Joint(),
+            "composed": evaluation.Composed(self.task.make_state()),
+        }
         most = self.task.step_limit if max_moves is None else max_moves
-        (kernel if self._compiled else kernel.py_func)(*arguments, episodes, most, results)
+        run = evaluation.run_tests if self._compiled else evaluation.run_tests.py_func
+        run(manners[manner], self.task.kernel, self.learner, probe, episodes, most, results)
         return Episodes(results[:, 0], results[:, 1], np.full(episodes, np.nan))
 
     def restore(self, memory: Memory) -> None:

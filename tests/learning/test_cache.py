@@ -22,7 +22,7 @@ training.test(2)
 dispatchers = [k for k in gc.get_objects() if isinstance(k, Dispatcher)]
 ours = [k for k in dispatchers if k.__module__.startswith(("hose_mj", "learning"))]
 misses = sum(sum(k.stats.cache_misses.values()) for k in ours)
-loops = loop.run_turns, evaluation.test_turns
+loops = loop.run_turns, evaluation.run_tests
 print(json.dumps([misses, *(sum(k.stats.cache_hits.values()) for k in loops)]))
 """
 

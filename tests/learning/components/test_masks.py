@@ -26,7 +26,7 @@ from learning.components.masks import MaskedEnv, VetoMasks
 from learning.components.shared_policy import SharedPolicyEnv
 from learning.learners import catalog
 from learning.study.training import Training
-from learning.tables import FIRST_CAPACITY, LARGEST_LOAD
+from learning.tables import FIRST_CAPACITY, SLOTS_PER_KEY
 
 
 class Ledge:
@@ -236,7 +236,7 @@ def test_a_hashed_table_grows_and_forgets_nothing():
             state[task.layout["goals"]] = cell // 21 - 10, cell % 21 - 10
             taught.append((state, agent, int(random.integers(task.n_actions))))
             masks.learn(*taught[-1], stretch)
-    assert len(taught) > LARGEST_LOAD * FIRST_CAPACITY
+    assert SLOTS_PER_KEY * len(taught) > FIRST_CAPACITY
     assert masks.count_vetoes() == len(taught)
     for state, agent, action in taught:
         assert masks.compute_mask(state, agent).tolist() == [k != action for k in range(5)]

@@ -1,4 +1,4 @@
-"""Undesired state-action prediction: the balanced buffer, the flat forest, vetoes, the policy."""
+"""Undesired state-action prediction: the balanced buffer, the flat forest, vetoes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import draw_below, make_stream
 from learning.components import usap_kernels
 from learning.components.experience import record_experience
-from learning.components.usap import UndesiredPredictor, compute_usap_policy
+from learning.components.usap import UndesiredPredictor
 
 TAXI = make_task("taxi", step_limit=10**9)
 N_VARIABLES, N_ACTIONS = len(TAXI.variables), TAXI.n_actions
@@ -226,34 +226,25 @@ def test_random_moves_under_the_vetoes_rarely_collide():
     assert np.mean(collided[500:]) < 0.5 * free.undesired[500:].mean()
 
 
-def test_a_seed_fixes_everything_and_a_restored_predictor_goes_on_alike():
-    one, same, restored = (make_predictor(capacity=20) for _ in range(3))
-    fill(one)
-    fill(same)
-    restored.restore(one.to_arrays())
-    fill(one, seed=8)
-    fill(restored, seed=8)
-    fill(same, seed=8)
-    for other in (same, restored):
-        ours, theirs = one.to_arrays(), other.to_arrays()
-        assert all(np.array_equal(ours[name], theirs[name]) for name in ours)
+def get_arrays(predictor):
+    return [a for a in (*predictor.buffer, *predictor.forest, predictor.stream) if np.ndim(a)]
+
+
+def test_a_seed_fixes_everything():
+    one, same = make_predictor(capacity=20), make_predictor(capacity=20)
+    for predictor in (one, same):
+        fill(predictor)
+    assert all(map(np.array_equal, get_arrays(one), get_arrays(same)))
     assert not np.array_equal(make_predictor(1).stream, make_predictor(2).stream)
 
 
 def test_the_arrays_stay_where_they_are():
     """A compiled loop that was given them sees every fit."""
     predictor = make_predictor()
-    forest, buffer = predictor.forest, predictor.buffer
+    before = get_arrays(predictor)
     fill(predictor)
-    predictor.restore(predictor.to_arrays())
-    assert predictor.forest is forest
-    assert predictor.buffer is buffer
-    assert forest.trained.sum() > 0
-
-
-def test_a_predictor_of_another_task_is_not_restored():
-    with pytest.raises(InputError, match="saved predictor"):
-        make_predictor().restore(make_predictor(capacity=50).to_arrays())
+    assert all(now is then for now, then in zip(get_arrays(predictor), before, strict=True))
+    assert predictor.forest.trained.sum() > 0
 
 
 @pytest.mark.parametrize(
@@ -271,39 +262,3 @@ def test_a_predictor_of_another_task_is_not_restored():
 def test_wrong_options_are_refused(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         make_predictor(**wrong)
-
-
-numbers = st.floats(-10.0, 10.0)
-
-
-@given(
-    st.lists(st.tuples(numbers, st.floats(0.0, 1.0)), min_size=1, max_size=6),
-    st.floats(0.0, 1.0),
-)
-def test_the_policy_is_a_distribution_over_what_is_allowed(pairs, epsilon):
-    q_values, p = np.array(pairs).T
-    policy = compute_usap_policy(q_values, p, epsilon)
-    assert policy.sum() == pytest.approx(1.0)
-    assert (policy >= 0.0).all()
-    allowed = p < 0.5 if (p < 0.5).any() else p == p.min()
-    assert not policy[~allowed].any()
-    assert policy[allowed].min() >= epsilon / allowed.sum() - 1e-12
-
-
-def test_the_policy_by_hand():
-    """The vetoed action has the highest value; two of the other three tie; epsilon 0.3."""
-    policy = compute_usap_policy(
-        np.array([9.0, 2.0, 1.0, 2.0]), np.array([0.5, 0.1, 0.0, 0.4]), 0.3
-    )
-    assert policy == pytest.approx([0.0, 0.45, 0.1, 0.45])
-    strict = compute_usap_policy(np.array([9.0, 2.0]), np.array([0.5, 0.1]), 0.0, 0.51)
-    assert strict.tolist() == [1.0, 0.0]
-    none_left = compute_usap_policy(np.array([9.0, 2.0]), np.array([0.9, 0.6]), 0.5)
-    assert none_left.tolist() == [0.0, 1.0]
-
-
-def test_the_policy_refuses_what_is_no_epsilon_and_other_lengths():
-    with pytest.raises(InputError, match="epsilon"):
-        compute_usap_policy(np.zeros(2), np.zeros(2), 1.5)
-    with pytest.raises(InputError, match="shape"):
-        compute_usap_policy(np.zeros(2), np.zeros(3), 0.5)

@@ -28,9 +28,17 @@ FLOORS = {
         *("hose_mj.errors", "hose_mj.checks", "hose_mj.compiled", "hose_mj.hoses"),
         *("hose_mj.hoses.spec", "hose_mj.scenes"),
     },
-    "hose_mj.world": {"hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes"},
+    "hose_mj.world": {
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.hoses.spec"),
+        "hose_mj.scenes",
+    },
     "hose_mj.constraints": {
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
+        "hose_mj.world",
+    },
+    "hose_mj.rollout": {
         *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),
+        *("hose_mj.constraints", "hose_mj.recording"),
     },
     "hose_mj.tasks": {
         *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
@@ -38,7 +46,8 @@ FLOORS = {
     },
     "hose_mj.envs": {
         *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
-        *("hose_mj.world", "hose_mj.constraints", "hose_mj.tasks", "hose_mj.recording"),
+        *("hose_mj.world", "hose_mj.constraints", "hose_mj.rollout", "hose_mj.tasks"),
+        "hose_mj.recording",
     },
 }
 PUBLIC = {

@@ -1,0 +1,1 @@
+"""A scene, its robots and a hose of any model, with one clock."""

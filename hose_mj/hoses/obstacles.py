@@ -33,6 +33,8 @@ class Obstacle:
         angular_velocity: (3,), rad/s.
         skips: arc lengths between which the hose does not touch it, lowest first (m); by default
             none. The hose where a robot holds it does not touch that robot.
+        stiffness_factor: of this contact over that of the law. Light bodies that move by what the
+            hose did to them in the step before need less than 1.
 
     Raises:
         InputError: an unknown kind, a size that is missing or not above zero, a rotation that is
@@ -47,10 +49,12 @@ class Obstacle:
     velocity: ArrayLike = _ZERO
     angular_velocity: ArrayLike = _ZERO
     skips: tuple[float, float] = (np.inf, -np.inf)
+    stiffness_factor: float = 1.0
 
     def __post_init__(self) -> None:
         check_choice("kind of obstacle", self.kind, list(KINDS))
         check_number("friction", self.friction, may_be_zero=True)
+        check_number("stiffness_factor", self.stiffness_factor)
         for name in ("position", "velocity", "angular_velocity"):
             object.__setattr__(self, name, _freeze(check_vector(name, getattr(self, name))))
         object.__setattr__(self, "rotation", _freeze(_check_rotation(self.rotation)))

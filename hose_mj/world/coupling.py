@@ -81,15 +81,16 @@ class Bodies:
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
 
-    def find_compliance(self, in_contact: bool, is_exact: bool) -> Array:
+    def find_compliance(self, is_exact: bool) -> Array:
         """By how much F (N) moves the sites against it within the step, (3 k, 3 k), m/N.
+
+        Contacts, limits and other constraints of the last step tried go on to act, and give way as
+        MuJoCo lets them.
 
         Args:
             is_exact: True for the derivative at the last step tried: forces act on the pose at the
                 beginning of the step and are seen on that at its end, so it is not symmetric where
                 bodies turn. False for the symmetric one without the turn, which every step can do.
-            in_contact: whether contacts, limits and other constraints of the last step tried go on
-                to act, and give way as MuJoCo lets them; else as if there were none.
         """
         model, data = self._model, self._data
         dt = model.opt.timestep
@@ -97,7 +98,7 @@ class Bodies:
         damped = self._mass.copy()
         damped[self._deriv_rows, self._deriv_columns] -= dt * data.qDeriv[self._deriv_places]
         moved = self._jacobian.T
-        if in_contact and data.nefc:
+        if data.nefc:
             active = np.asarray(data.efc_state) == _QUADRATIC
             if active.any():
                 rows = np.asarray(data.efc_J).reshape(data.nefc, -1)[active]

@@ -29,9 +29,9 @@ from hose_mj.world.world import World
 
 GAP = 1e-6
 """Largest distance of hose and site at the end of a step (m), where `MOST_SWEEPS` suffice."""
-MOST_SWEEPS = 6
+MOST_SWEEPS = 10
 _SLOW = 5.0
-"""A sweep that closes the gap by less than this factor lets the next one try the other response."""
+"""After a sweep that closes the gap by less than this factor the answer to it is corrected."""
 
 
 class GedsWorld(World):
@@ -193,40 +193,38 @@ class GedsWorld(World):
     def _meet(self, held: Sequence[Hold]) -> None:
         """Finds the forces under which the steps of hose and bodies end with both together.
 
-        Each sweep solves the hose for a linear answer of the bodies. Where the symmetric one leaves
-        a gap, Newton's closes it; where contacts open or close, the answer without them may.
+        Each sweep solves the hose for a linear answer of the bodies: first the symmetric one, then
+        Newton's, and where contacts open or close so that this does not help, Newton's corrected
+        by what the bodies did answer (Broyden 1965).
         """
         bodies, hose = self._bodies, self.hose
         forces = np.zeros((len(held), 3))
-        reached = bodies.try_step(forces)
-        best = _Meeting(np.inf, forces, reached, reached, np.zeros((0, 0)))
-        in_contact, is_exact, may_be_exact = True, False, True
+        best = _Meeting(np.inf, forces, bodies.try_step(forces), forces, np.zeros((0, 0)))
+        give = bodies.find_compliance(is_exact=False)
+        is_symmetric = True
         for _ in range(MOST_SWEEPS):
-            give = bodies.find_compliance(in_contact, is_exact)
-            aim = reached + (give @ forces.ravel()).reshape(-1, 3)
+            aim = best.reached + (give @ best.forces.ravel()).reshape(-1, 3)
             try:
                 found = hose.try_step(held, aim, give)
             except StepError:
-                if not is_exact:
+                if is_symmetric:
                     raise
-                is_exact = may_be_exact = False
+                give, is_symmetric = bodies.find_compliance(is_exact=False), True
                 continue
             self.sweeps += 1
             moved = bodies.try_step(found)
-            gap = float(np.abs(moved - hose.find_held_positions()).max())
-            is_slow = gap > best.gap / _SLOW
+            missed = moved - hose.find_held_positions()
+            gap = float(np.abs(missed).max())
+            is_quick, change = gap < best.gap / _SLOW, (found - best.forces).ravel()
             if gap < best.gap:
                 best = _Meeting(gap, found, moved, aim, give)
             if gap < GAP:
                 return
-            if is_slow and is_exact:
-                may_be_exact = False
-            elif is_slow:
-                in_contact = not in_contact
-            is_exact = may_be_exact
-            if gap > best.gap:
-                bodies.try_step(best.forces)
-            forces, reached = best.forces, best.reached
+            if is_quick:
+                give = bodies.find_compliance(is_exact=True)
+            else:
+                give = give - np.outer(missed.ravel(), change) / max(float(change @ change), 1e-300)
+            is_symmetric = False
         hose.try_step(held, best.aim, best.give)
         bodies.try_step(best.forces)
 

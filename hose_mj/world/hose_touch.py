@@ -58,7 +58,8 @@ class HoseTouch:
     def set_obstacles(self, friction: float) -> None:
         """Hands the geoms to the hose as obstacles, where they are now."""
         self._friction = friction
-        made = self.geoms.make_obstacles(self._model, self._data, friction)
+        stiffness = self._hose.contact_stiffness()
+        made = self.geoms.make_obstacles(self._model, self._data, friction, stiffness)
         self._hose.set_obstacles(made)
 
     def reset(self) -> None:
@@ -97,13 +98,13 @@ class HoseTouch:
         return np.concatenate([found[3:], found[:3]])
 
     def update(self) -> None:
-        """After a step: geoms move on, and what the hose does to them is known."""
+        """After a step: what the hose did to geoms, where it felt them, is known; they move on."""
         if self._meter is not None:
             self._measured_forces[:] = self._hose.measured_forces()
         if not len(self._moving):
             return
-        self.place()
         self.pushes[:] = self._hose.push_on_obstacles()[self.geoms.moving]
+        self.place()
 
     def push(self, generalized: Array) -> None:
         """Adds what the hose did to moving geoms in the last step to generalised forces (nv,)."""

@@ -83,8 +83,9 @@ def _draw_arcs(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
             _draw_arc(place, chord, end - s, parts, bulge)
             for bulge in (side, -side, np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]))
         ]
-        clear = [hose.measure_obstacles(c).min(initial=hose.spec.radius) for c in choices]
-        points[mine] = choices[int(np.argmax(np.minimum(clear, hose.spec.radius)))]
+        enough = 0.99 * hose.spec.radius
+        clear = [hose.measure_obstacles(c).min(initial=enough) for c in choices]
+        points[mine] = choices[int(np.argmax(clear))]
         last = direction
     beyond = even > arc_lengths[-1]
     points[beyond] = places[-1] + (even[beyond] - arc_lengths[-1])[:, None] * last

@@ -17,6 +17,8 @@ from hose_mj.hoses.obstacles import KINDS, Obstacle
 
 KIND_NAMES = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")): kind for kind in KINDS}
 """MuJoCo's numbers of the shapes that are obstacles, and their names."""
+_LARGEST_KICK = 0.5
+"""What the stiffness of a delayed contact times the square of the time step is over a mass."""
 OWN_ARC = 3.0
 """Arc on either side of a robot's site where the hose does not touch that robot, in its radii."""
 
@@ -60,9 +62,25 @@ class SceneGeoms:
         return cls(ids, measured, moving, skips[ids], skips[measured])
 
     def make_obstacles(
-        self, model: mujoco.MjModel, data: mujoco.MjData, friction: float
+        self, model: mujoco.MjModel, data: mujoco.MjData, friction: float, stiffness: float
     ) -> list[Obstacle]:
-        """Returns the obstacles at the poses in `data`, at rest."""
+        """Returns the obstacles at the poses in `data`, at rest.
+
+        Args:
+            model: MuJoCo's.
+            data: MuJoCo's.
+            friction: Coulomb's coefficient.
+            stiffness: force per length and depth that a body is to feel with a delay of one step,
+                N/m^2; where it is too light for that, its contact is softer.
+        """
+        masses = np.zeros(model.nbody)
+        np.add.at(masses, model.body_weldid, model.body_mass)
+        factors = np.ones(len(self.ids))
+        for place in self.moving:
+            g = self.ids[place]
+            felt = stiffness * 2.0 * model.geom_rbound[g] * model.opt.timestep**2
+            mass = masses[model.body_weldid[model.geom_bodyid[g]]]
+            factors[place] = min(1.0, max(_LARGEST_KICK * mass / felt, 1e-6))
         return [
             Obstacle(
                 kind=KIND_NAMES[int(model.geom_type[g])],
@@ -71,8 +89,9 @@ class SceneGeoms:
                 size=model.geom_size[g],
                 friction=friction,
                 skips=(float(skip[0]), float(skip[1])),
+                stiffness_factor=float(factor),
             )
-            for g, skip in zip(self.ids, self.skips, strict=True)
+            for g, skip, factor in zip(self.ids, self.skips, factors, strict=True)
         ]
 
 

@@ -58,8 +58,8 @@ def test_compliance_is_the_derivative_of_a_step_while_contacts_stay(bodies):
     forces, change = rng.normal(size=(2, len(sites), 3))
     pair.begin()
     reached = pair.try_step(forces)
-    exact = pair.find_compliance(True, True)
-    symmetric = pair.find_compliance(True, False)
+    exact = pair.find_compliance(is_exact=True)
+    symmetric = pair.find_compliance(is_exact=False)
     step = 1e-4
     moved = (pair.try_step(forces + step * change) - reached).ravel() / step
     scale = np.abs(moved).max()

@@ -135,6 +135,11 @@ class ContactSet:
             self._points, geoms, self._given, self._numbers, self.arc_lengths, room
         )
 
+    def find_stiffness(self) -> float:
+        """Stiffness of the law with its damping over a step, N/m^2."""
+        damping = 2.0 * self._numbers[contact_law.DAMPING] / self._timestep
+        return float(self._numbers[contact_law.STIFFNESS] * (1.0 + damping))
+
     def make_shapes(self, obstacles: Sequence[Obstacle]) -> Array:
         """Returns obstacles as kernels read them, rows of shapes.py, (G, ROW)."""
         rows = np.zeros((len(obstacles), shapes.ROW))
@@ -287,7 +292,7 @@ class ContactSet:
         row[shapes.VELOCITY : shapes.VELOCITY + 3] = np.asarray(obstacle.velocity)[order]
         spin = self._parity * np.asarray(obstacle.angular_velocity)[order]
         row[shapes.SPIN : shapes.SPIN + 3] = spin
-        row[shapes.SCALE] = 1.0
+        row[shapes.SCALE] = obstacle.stiffness_factor
         row[shapes.SKIP_FROM], row[shapes.SKIP_TO] = obstacle.skips
         return row
 

@@ -143,7 +143,6 @@ def advance_with_masses(axes, hose, holds, loads, limits, run, state, counts, ma
         end_step(axes, hose, holds, state, work.span)
         _move(axes, holds, masses, first, dt)
         if len(masses.owner) > 0:
-            _carry_shapes(contact.geoms, masses)
             compute_forces(axes, contact, state.x, state.v, forces, reactions)
             masses.push[:, :] = 0.0
             for g in range(len(masses.owner)):
@@ -151,4 +150,5 @@ def advance_with_masses(axes, hose, holds, loads, limits, run, state, counts, ma
                 if i >= 0:
                     for c in range(3):
                         masses.push[i, c] += reactions[g, c]
+            _carry_shapes(contact.geoms, masses)
     return DONE

@@ -81,6 +81,13 @@ class Touching:
         changes |= {"velocity": velocity, "angular_velocity": angular_velocity}
         self._contacts.move(number, changes)
 
+    def contact_stiffness(self) -> float:
+        """What a contact's force per length grows by with the depth within one step, N/m^2.
+
+        Its damping counts as what it adds to that in an implicit step.
+        """
+        return self._contacts.find_stiffness()
+
     def place_obstacles(
         self, numbers: np.ndarray, positions: Array, rotations: Array, twists: Array
     ) -> None:

@@ -1,0 +1,217 @@
+"""A spline hose in a scene: stability, contact both ways, snapshots, mistakes."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from hose_mj.errors import InputError
+from hose_mj.world.geds_world import GedsWorld
+from hose_mj.world.registry import make_world
+
+BOX = "-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  -1 -1 1  1 -1 1  1 1 1  -1 1 1"
+MASSES, STIFFNESSES, STEPS = (0.05, 1.0, 50.0), (1e3, 1e6), (0.001, 0.005)
+FLINGS = list(itertools.product(MASSES, (0.05, 50.0), STIFFNESSES, STEPS))
+
+
+def fling(write_scene, one, other, stiffness, timestep, scheme, duration):
+    """Throws two robots apart; returns the largest energy over that at the start, and the gap."""
+    robots = [
+        write_scene.ball(0, (0.6, 0.1, 0.0), one),
+        write_scene.ball(1, (0.3, -0.1, 0.0), other),
+    ]
+    scene = write_scene(robots, timestep=timestep, axial_stiffness=stiffness)
+    world = GedsWorld(scene, scheme=scheme)
+    world.data.qvel[:3], world.data.qvel[6:9] = [6.0, 3.0, 1.0], [-3.0, -6.0, 2.0]
+    mass = np.repeat([one, other], 3)
+    energies, gaps = [], []
+    for _ in range(round(duration / timestep / 10)):
+        robots = 0.5 * float(mass @ world.data.qvel[[0, 1, 2, 6, 7, 8]] ** 2)
+        energies.append(robots + world.hose.energies().total)
+        world.step(10)
+        gaps.append(np.abs(world.site_positions() - world.position(world.arc_lengths)).max())
+    return max(energies) / energies[0], max(gaps)
+
+
+@pytest.mark.parametrize("scheme", ["bdf2", "backward-euler"])
+@pytest.mark.parametrize(("one", "other", "stiffness", "timestep"), FLINGS[::7])
+def test_flung_robots_gain_no_energy(write_scene, one, other, stiffness, timestep, scheme):
+    growth, gap = fling(write_scene, one, other, stiffness, timestep, scheme, 0.5)
+    assert growth < 1.02
+    assert gap < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["bdf2", "backward-euler", "sdirk2"])
+@pytest.mark.parametrize(("one", "other", "stiffness", "timestep"), FLINGS)
+def test_robots_of_any_mass_on_a_hose_of_any_stiffness_gain_no_energy(
+    write_scene, one, other, stiffness, timestep, scheme
+):
+    growth, gap = fling(write_scene, one, other, stiffness, timestep, scheme, 2.0)
+    assert growth < 1.02
+    assert gap < 1e-6
+
+
+def drive_at_random(world, duration, seed=0):
+    """Largest distance of hose and sites under controls that jump twice a second."""
+    rng = np.random.default_rng(seed)
+    low, high = world.model.actuator_ctrlrange.T
+    worst = 0.0
+    for k in range(round(duration / world.timestep / 10)):
+        if k % round(0.05 / world.timestep) == 0:
+            world.control[:] = rng.uniform(low, high)
+        world.step(10)
+        gap = np.abs(world.site_positions() - world.position(world.arc_lengths)).max()
+        worst = max(worst, gap)
+    return worst
+
+
+@pytest.mark.parametrize("name", ["deck", "floor_3"])
+def test_hose_stays_at_the_sites_of_driven_robots(name):
+    assert drive_at_random(make_world(name, timestep=0.005), 0.5) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("timestep", [0.002, 0.005])
+@pytest.mark.parametrize("name", ["deck", "corridor", "lift", "floor_2", "floor_6"])
+def test_hose_stays_at_the_sites_of_driven_robots_for_long(name, timestep):
+    assert drive_at_random(make_world(name, timestep=timestep), 10.0) < 1e-4
+
+
+@pytest.mark.parametrize("timestep", [0.001, 0.005])
+def test_a_light_puck_pressed_to_a_wall_by_the_hose_stays_with_it(write_scene, timestep):
+    wall = '<geom type="box" pos="0.93 0 0" size="0.1 0.2 0.1"/>'
+    robots = [write_scene.slider(0, (0.8, 0.0, 0.0), 0.05, axes="xy")]
+    scene = write_scene(robots, wall, timestep=timestep, axial_stiffness=1e5, length=0.81)
+    world = GedsWorld(scene)
+    gaps = []
+    for force in (5.0, -5.0, 20.0, -20.0, 3.0):
+        world.apply_force(0, (force, 0.0, 0.0))
+        for _ in range(round(0.1 / timestep)):
+            world.step()
+            gaps.append(np.abs(world.site_positions() - world.position(world.arc_lengths)).max())
+    assert max(gaps) < 1e-6
+
+
+def test_hose_on_the_floor_hands_its_weight_to_floor_and_sites():
+    world = make_world("floor_2")
+    world.step(500)
+    on_floor = world.hose.push_on_obstacles()[:, 2].sum()
+    held = world.attachment_forces()[:, 2].sum()
+    weight = 9.81 * world.scene.spec.mass
+    assert held - on_floor == pytest.approx(weight, rel=1e-3)
+    assert on_floor < -0.5 * weight
+
+
+def test_what_the_hose_does_to_a_body_moves_it(write_scene):
+    # A table on a spring: it sinks by its own weight and by what lies on it.
+    table = (
+        '<body name="table" pos="0.4 0 -0.26"><joint type="slide" axis="0 0 1" stiffness="400"'
+        ' damping="20"/><geom type="box" size="0.25 0.4 0.25" mass="1"/></body>'
+    )
+    robots = [write_scene.slider(0, (0.8, 0.0, 0.0), 1.0, axes="xy", solid=False)]
+    world = GedsWorld(write_scene(robots, table, gravity="0 0 -9.81", linear_density=0.5))
+    world.step(1000)
+    (push,) = world.hose.push_on_obstacles()
+    assert push[2] < -0.5 * 0.5 * 9.81 * 0.5
+    sunk = -float(world.data.joint(0).qpos[0])
+    assert sunk == pytest.approx((9.81 - push[2]) / 400.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("compiled_pucks", [True, False])
+def test_a_robot_shoves_the_hose_of_its_neighbour_and_feels_it(write_scene, compiled_pucks):
+    # Robot 1 is driven into the stretch on the other side of robot 0; momentum balances.
+    robots = [
+        write_scene.slider(0, (0.55, 0.1, 0.0), 1.0, axes="xy"),
+        write_scene.slider(1, (0.3, 0.0, 0.0), 1.0, axes="xy", size=0.03),
+    ]
+    top = '<custom><numeric name="hose_attachments" data="0.9 0.5"/></custom>'
+    scene = write_scene(robots, top=top)
+    world = GedsWorld(scene, scheme="backward-euler", compiled_pucks=compiled_pucks)
+    middle = world.position([0.7])[0]
+    aim = middle - world.site_positions()[1]
+    world.apply_force(1, 6.0 * aim / np.linalg.norm(aim))
+    start = momentum_of(world)
+    impulse, touched = np.zeros(3), 0.0
+    for _ in range(80):
+        before = world._touch.pushes[:, :3].sum(axis=0)
+        world.step()
+        after = world._touch.pushes[:, :3].sum(axis=0)
+        touched = max(touched, np.abs(after).max())
+        # Contact reaches the robots one step late.
+        forces = world.robot_forces.sum(axis=0) + world.attachment_forces()[-1] + before - after
+        impulse += world.timestep * forces
+    assert touched > 0.05
+    np.testing.assert_allclose((momentum_of(world) - start)[:2], impulse[:2], atol=5e-3)
+
+
+def momentum_of(world):
+    robots = world.site_velocities()[:-1].sum(axis=0)
+    return world.hose.momentum().linear + robots
+
+
+def test_a_mesh_is_felt_like_the_box_that_it_is(write_scene):
+    robots = [write_scene.slider(0, (0.7, 0.0, 0.0), 1.0, axes="x", solid=False)]
+    asset = f'<asset><mesh name="cube" vertex="{BOX}" scale="0.1 0.2 0.05"/></asset>'
+    place = 'pos="0.35 0 -0.1"'
+    shapes = [
+        (f'<geom type="box" {place} size="0.1 0.2 0.05"/>', ""),
+        (f'<geom type="mesh" {place} mesh="cube"/>', asset),
+    ]
+    lines = []
+    for geom, top in shapes:
+        world = GedsWorld(write_scene(robots, geom, top=top, gravity="0 0 -9.81"))
+        world.step(400)
+        lines.append(world.position(np.linspace(0.0, 1.0, 21)))
+    assert lines[0][:, 2].min() < -0.1
+    np.testing.assert_allclose(lines[1], lines[0], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["floor_3", "deck"])
+def test_a_restored_world_goes_on_bit_by_bit(name):
+    world = make_world(name)
+    world.control[:] = 0.3 * world.model.actuator_ctrlrange[:, 1]
+    world.apply_force(0, (0.5, -0.2, 0.0))
+    world.step(60)
+    state = world.snapshot()
+    world.step(40)
+    after = [world.snapshot(), world.position(np.linspace(0.0, world.scene.spec.length, 9))]
+    world.reset()
+    world.restore(state)
+    world.step(40)
+    again = [world.snapshot(), world.position(np.linspace(0.0, world.scene.spec.length, 9))]
+    np.testing.assert_array_equal(again[0]["mujoco"], after[0]["mujoco"])
+    for part, values in after[0]["hose"]["hose"]["state"].items():
+        np.testing.assert_array_equal(again[0]["hose"]["hose"]["state"][part], values)
+    np.testing.assert_array_equal(again[1], after[1])
+    fresh = make_world(name)
+    fresh.restore(state)
+    fresh.step(40)
+    np.testing.assert_array_equal(fresh.position([0.5]), world.position([0.5]))
+
+
+def test_the_centre_line_is_the_hose():
+    world = make_world("floor_4")
+    s = np.linspace(0.0, world.scene.spec.length, 57)
+    np.testing.assert_allclose(world.centre_line().position(s), world.position(s), atol=1e-12)
+
+
+def test_mistakes_are_named_and_change_nothing():
+    world = make_world("floor_2")
+    before = world.snapshot()
+    with pytest.raises(InputError, match="n_steps"):
+        world.step(-1)
+    world.control[0] = np.nan
+    with pytest.raises(InputError, match="control"):
+        world.step()
+    world.control[0] = 0.0
+    with pytest.raises(InputError, match="robot is 2"):
+        world.apply_force(2, (1.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="force"):
+        world.apply_force(0, (1.0, np.inf, 0.0))
+    np.testing.assert_array_equal(world.snapshot()["mujoco"], before["mujoco"])
+    for options in ({"scheme": "verlet"}, {"scheme": "euler"}, {"timestep": 0.0}):
+        with pytest.raises(InputError, match=next(iter(options))):
+            make_world("floor_2", **options)
+    with pytest.raises(InputError, match=r"model is .rope"):
+        make_world("floor_2", "rope")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -45,7 +45,7 @@ class FlexSettings(ChainSettings):
 
 
 def make_rod(
-    spec: HoseSpec, rest: Array, masses: Array, edge_options: dict[str, object]
+    spec: HoseSpec, rest: Array, masses: Array, edge_options: Mapping[str, object]
 ) -> mujoco.MjSpec:
     """Vertices on slides, MuJoCo's bending between them, edges that keep their lengths.
 

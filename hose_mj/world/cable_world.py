@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -17,10 +16,14 @@ from hose_mj.hoses.model import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
 from hose_mj.scenes.mjcf import Scene
 from hose_mj.world.hose_contact import HoseContact
-from hose_mj.world.mujoco_world import MujocoWorld, Numerics
+from hose_mj.world.mujoco_scene import Numerics
+from hose_mj.world.mujoco_world import MujocoWorld
 
 _SAFETY = 0.5
 """Of MuJoCo's default step over the largest stable one of an undamped free chain."""
+
+_HIDDEN = 4
+"""Group of geoms that viewers do not draw unless asked."""
 
 
 class CableWorld(MujocoWorld):
@@ -67,7 +70,7 @@ class CableWorld(MujocoWorld):
             substeps = math.ceil(timestep / most * (1.0 - 1e-9))
         nodes = self._layout.nodes.copy()
         nodes[-1] = spec.length
-        super().__init__(scene, nodes, Numerics(timestep, substeps, "implicitfast", "dense"))
+        super().__init__(scene, nodes, Numerics(timestep, substeps, "discrete", "sparse"))
 
     def _locate_holds(self, scene: Scene) -> list[tuple[int, float]]:
         """Segment of each attachment and the distance from its first node (m)."""
@@ -79,16 +82,31 @@ class CableWorld(MujocoWorld):
         return list(zip(index.tolist(), along.tolist(), strict=True))
 
     def _make_hose(
-        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, object]
+        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
     ) -> mujoco.MjSpec:
         maker, bodies = self._kind.make_chain(self._layout, None)
+        h = self._layout.segment_length
         ChainMass.of_hose(self._layout, spec.linear_density, spec.radius).write(bodies)
         for body, bit in zip(bodies, contact.bits, strict=True):
             for geom in body.geoms:
                 contact.write(geom, int(bit))
+        for body, along in [*((body, 0.0) for body in bodies), (bodies[-1], h)]:
+            ball = body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                pos=[along, 0.0, 0.0],
+                size=[spec.radius, 0.0, 0.0],
+                group=_HIDDEN,
+            )
+            contact.write(ball, contact.plane_bit)
         for k, (index, along) in enumerate(self._held):
             bodies[index].add_site(name=f"hold{k}", pos=[along, 0.0, 0.0])
         return maker
+
+    def _finish_model(self, spec: HoseSpec, model: mujoco.MjModel) -> None:
+        """Keeps the first segment from rolling about its axis, as a coupling does."""
+        roll = int(model.body_dofadr[self.hose_bodies[0]]) + 3
+        model.dof_armature[roll] = spec.mass * spec.length**2
+        mujoco.mj_setConst(model, mujoco.MjData(model))
 
     def _lay(self, nodes: Array) -> None:
         frames = transport_frames(nodes, self._kind.base_frame)

@@ -27,6 +27,26 @@ class Pin:
     target: Array
 
 
+def fit_curve(curve: Array, nodes: Array, arc_lengths: Array, places: Array) -> Array:
+    """Returns a chain along a curve.
+
+    Args:
+        curve: points even in arc length from 0 to L (n, 3), m.
+        nodes: arc lengths of the chain's nodes, rising from 0 to L, (K + 1,), m.
+        arc_lengths: of what holds it (k,), m.
+        places: where that is (k, 3), m.
+
+    Returns:
+        nodes (K + 1, 3), m, near the curve; see `fit_chain`.
+    """
+    even, lengths = np.linspace(0.0, nodes[-1], len(curve)), np.diff(nodes)
+    points = np.stack([np.interp(nodes, even, curve[:, c]) for c in range(3)], axis=1)
+    piece = np.clip(np.searchsorted(nodes, arc_lengths, "right") - 1, 0, len(lengths) - 1)
+    parts = (arc_lengths - nodes[piece]) / lengths[piece]
+    pins = [Pin(int(k), float(part), p) for k, part, p in zip(piece, parts, places, strict=True)]
+    return fit_chain(points, lengths, pins)
+
+
 def fit_chain(points: Array, lengths: Array, pins: list[Pin]) -> Array:
     """Returns nodes near `points` whose distances are `lengths` and that meet the pins.
 

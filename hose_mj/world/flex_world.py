@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import mujoco
 import numpy as np
 
@@ -16,7 +14,8 @@ from hose_mj.hoses.model import Array, Hold
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf import Scene
 from hose_mj.world.hose_contact import HoseContact
-from hose_mj.world.mujoco_world import PREFIX, MujocoWorld, Numerics
+from hose_mj.world.mujoco_scene import PREFIX, Numerics
+from hose_mj.world.mujoco_world import MujocoWorld
 
 
 class FlexWorld(MujocoWorld):
@@ -66,7 +65,7 @@ class FlexWorld(MujocoWorld):
         return self._read_motion().stretch()
 
     def _make_hose(
-        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, object]
+        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
     ) -> mujoco.MjSpec:
         """Bending and edges are those of one flex; others over the same vertices collide."""
         masses = self._layout.compute_masses(spec.linear_density)
@@ -75,16 +74,10 @@ class FlexWorld(MujocoWorld):
         for k, run in enumerate(np.split(np.arange(len(contact.bits)), changes)):
             vertices = range(int(run[0]), int(run[-1]) + 2)
             touching = add_edges(maker, f"contact{k}", vertices, spec.radius)
-            contact.write(touching, int(contact.bits[run[0]]))
+            contact.write(touching, int(contact.bits[run[0]]) | contact.plane_bit)
         for k, vertex in enumerate(self._held):
             maker.body(f"v{vertex}").add_site(name=f"hold{k}")
         return maker
-
-    def _compile(self, maker: mujoco.MjSpec) -> mujoco.MjModel:
-        """The flexes that collide are told from those that stretch: MuJoCo warns of each."""
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "flex .* is not rigid")
-            return super()._compile(maker)
 
     def _lay(self, nodes: Array) -> None:
         first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]

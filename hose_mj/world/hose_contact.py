@@ -3,6 +3,8 @@
 The hose has bits of MuJoCo's contype that no geom of the scene uses, and the geoms' conaffinity
 takes them on, so contacts within the scene stay as they are. Parts of the hose that pass by the
 same robots share a bit; a robot's own geoms do not take on the bits of the parts near its site.
+Planes have a bit of their own: of a capsule they touch the two ends, so spheres at the nodes are
+the same contacts, each of them once.
 """
 
 from __future__ import annotations
@@ -31,18 +33,20 @@ class HoseContact:
         friction: MuJoCo's five coefficients, of which the first two, Coulomb's, count.
         priority: above that of all geoms of the scene: in a contact with the hose its friction and
             hardness count.
-        solref: critically damped, two time steps.
-        bits: contype of each piece of the hose (N,).
+        solref: critically damped, two of the world's time steps.
+        bits: contype of each piece of the hose (N,), for all but planes.
+        plane_bit: contype for planes.
     """
 
     friction: list[float]
     priority: int
     solref: list[float]
     bits: np.ndarray
+    plane_bit: int
 
-    def write(self, item: mujoco.MjsGeom | mujoco.MjsFlex, bit: int) -> None:
-        """Lets a geom or flex of the hose touch the scene."""
-        item.contype, item.conaffinity, item.condim = bit, 0, 3
+    def write(self, item: mujoco.MjsGeom | mujoco.MjsFlex, bits: int) -> None:
+        """Lets a geom or flex of the hose touch what takes on these bits."""
+        item.contype, item.conaffinity, item.condim = bits, 0, 3
         item.friction = self.friction[: len(item.friction)]
         item.priority, item.solref = self.priority, self.solref
 
@@ -56,7 +60,7 @@ def open_scene(
         scene: checked.
         maker: its spec, compiled; what its geoms collide with is changed.
         nodes: arc lengths.
-        step: MuJoCo's time step (s).
+        step: the world's time step (s).
 
     Returns:
         how the hose touches them, and where the simple ones stand at the start.
@@ -70,17 +74,18 @@ def open_scene(
     groups, group = np.unique(passes, axis=0, return_inverse=True)
     used = int(np.bitwise_or.reduce([*model.geom_contype, *model.flex_contype, 0]))
     free = [1 << k for k in range(1, _BITS) if not used >> k & 1]
-    if len(free) < len(groups):
-        valid = f"at least {len(groups)} bits that no geom uses, for the hose"
+    if len(free) < len(groups) + 1:
+        valid = f"at least {len(groups) + 1} bits that no geom uses, for the hose"
         raise InputError("bits of contype", bin(used), valid)
-    bits = np.array(free[: len(groups)])
+    plane_bit, bits = free[0], np.array(free[1 : len(groups) + 1])
     owner = _find_owners(scene, model)
     touched = set(find_colliding(model).tolist())
     for geom in maker.geoms:
         if geom.id in touched:
             robot = owner[geom.id]
             open_to = bits if robot < 0 else bits[~groups[:, robot]]
-            geom.conaffinity |= int(open_to.sum())
+            is_plane = geom.type == mujoco.mjtGeom.mjGEOM_PLANE
+            geom.conaffinity |= plane_bit if is_plane else int(open_to.sum())
     sites = np.array([model.site(p.site).id for p in (*scene.robots, scene.source)])
     arc_lengths = np.array([*(robot.arc_length for robot in scene.robots), 0.0])
     geoms = SceneGeoms.find(model, data, sites, arc_lengths)
@@ -89,6 +94,7 @@ def open_scene(
         int(model.geom_priority.max(initial=0)) + 1,
         [2.0 * step, 1.0],
         bits[group.ravel()],
+        plane_bit,
     )
     return contact, geoms.make_obstacles(model, data, scene.friction)
 

@@ -7,7 +7,6 @@ between them and all contacts in one step.
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -16,64 +15,19 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.chain_holds import find_rows
-from hose_mj.hoses.chain_obstacles import IMPEDANCE_RATIO
 from hose_mj.hoses.flex_layout import interpolate
 from hose_mj.hoses.inputs import check_arc_lengths, check_count
 from hose_mj.hoses.model import Array
 from hose_mj.hoses.mujoco_chain import check_plain
 from hose_mj.hoses.mujoco_model import Motion, mute_warnings, went_bad
-from hose_mj.hoses.spec import HoseSpec, check_number
+from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf import Scene
 from hose_mj.world.centre_line import CentreLine
-from hose_mj.world.chain_fit import Pin, fit_chain
+from hose_mj.world.chain_fit import fit_curve
 from hose_mj.world.hose_contact import HoseContact, open_scene
 from hose_mj.world.laying import lay_hose
+from hose_mj.world.mujoco_scene import PREFIX, Numerics, join_hose
 from hose_mj.world.world import World
-
-PREFIX = "hose/"
-"""Of the names of all that is added to a scene."""
-HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]
-"""MuJoCo's solimp of ties and edges."""
-
-
-@dataclass(frozen=True)
-class Numerics:
-    """How MuJoCo steps a scene with a hose.
-
-    Attributes:
-        timestep: of the world (s).
-        substeps: MuJoCo's steps in one of these.
-        integrator, jacobian: MuJoCo's names.
-    """
-
-    timestep: float
-    substeps: int
-    integrator: str
-    jacobian: str
-
-    def __post_init__(self) -> None:
-        check_number("timestep", self.timestep)
-        check_count("substeps", self.substeps, 1)
-
-    @property
-    def inner_step(self) -> float:
-        """MuJoCo's own time step (s)."""
-        return self.timestep / self.substeps
-
-    def apply(self, option: Any) -> None:
-        """Writes the options of a scene that is being made.
-
-        Raises:
-            InputError: a scene that switches off what ties the hose to its robots.
-        """
-        for flag in ("CONSTRAINT", "EQUALITY"):
-            if option.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"):
-                raise InputError(f"<option> <flag> {flag.lower()}", "disable", "enable")
-        option.timestep = self.inner_step
-        option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{self.integrator.upper()}")
-        option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{self.jacobian.upper()}")
-        option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPEDANCE_RATIO
 
 
 class MujocoWorld(World):
@@ -107,30 +61,14 @@ class MujocoWorld(World):
         self._timestep = numerics.timestep
         maker = scene.make_spec()
         numerics.apply(maker.option)
-        contact, obstacles = open_scene(scene, maker, nodes, numerics.inner_step)
-        ties = {"solref": [2.0 * numerics.inner_step, 1.0], "solimp": HARD}
-        hose = self._make_hose(scene.spec, contact, ties)
-        names = [body.name for body in hose.worldbody.find_all(mujoco.mjtObj.mjOBJ_BODY)]
-        maker.attach(hose, prefix=PREFIX, frame=maker.worldbody.add_frame())
-        for k, place in enumerate((*scene.robots, scene.source)):
-            maker.add_equality(
-                name=f"{PREFIX}hold{k}",
-                type=mujoco.mjtEq.mjEQ_CONNECT,
-                objtype=mujoco.mjtObj.mjOBJ_SITE,
-                name1=f"{PREFIX}hold{k}",
-                name2=place.site,
-                **ties,
-            )
-        super().__init__(scene, self._compile(maker))
-        self.hose_bodies = np.array([self.model.body(PREFIX + name).id for name in names])
-        mass = float(self.model.body_mass[self.hose_bodies].sum())
-        if not np.isclose(mass, scene.spec.mass, rtol=1e-6):
-            valid = f"{scene.spec.mass:g} kg: no <compiler> settotalmass, boundmass, inertiafromgeom"
-            raise InputError("mass of the hose", mass, valid)
-        self._joints = self._find_joints()
-        self._holds = [
-            self.model.equality(f"{PREFIX}hold{k}").id for k in range(len(self.arc_lengths))
-        ]
+        contact, obstacles = open_scene(scene, maker, nodes, numerics.timestep)
+        hose = self._make_hose(scene.spec, contact, numerics.tie_options())
+        model, self.hose_bodies = join_hose(scene, maker, hose, numerics.tie_options())
+        self._finish_model(scene.spec, model)
+        super().__init__(scene, model)
+        first = int(model.body_dofadr[self.hose_bodies[0]])
+        self._joints = slice(first, first + int(model.body_dofnum[self.hose_bodies].sum()))
+        self._holds = [model.equality(f"{PREFIX}hold{k}").id for k in range(len(self.arc_lengths))]
         self._motion: Motion | None = None
         self._forces = np.zeros((len(self.arc_lengths), 3))
         self._tensions = np.zeros(0)
@@ -139,7 +77,7 @@ class MujocoWorld(World):
         curve = lay_hose(
             scene.spec, places, self.arc_lengths, obstacles, np.array(self.model.opt.gravity)
         )
-        self._start = self._fit(curve, places)
+        self._start = fit_curve(curve, nodes, self.arc_lengths, places)
         self.reset()
         met = self.position(self.arc_lengths) - self.site_positions()
         self.start_gap = float(np.linalg.norm(met, axis=1).max())
@@ -148,7 +86,7 @@ class MujocoWorld(World):
 
     @abstractmethod
     def _make_hose(
-        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, object]
+        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
     ) -> mujoco.MjSpec:
         """A model of the hose alone, with sites hold0, hold1, ... for robots and source.
 
@@ -157,6 +95,9 @@ class MujocoWorld(World):
             contact: how it touches the scene.
             ties: solref and solimp of equality constraints.
         """
+
+    def _finish_model(self, spec: HoseSpec, model: mujoco.MjModel) -> None:
+        """Sets what can be set in a compiled model only."""
 
     @abstractmethod
     def _lay(self, nodes: Array) -> None:
@@ -286,26 +227,3 @@ class MujocoWorld(World):
         """Forces of the ties on the hose in MuJoCo's last step (N + 1, 3), N."""
         force = self.data.efc_force
         return np.stack([force[find_rows(self.data, k)] for k in self._holds])
-
-    def _find_joints(self) -> slice:
-        """Where the hose's qvel are."""
-        addresses = self.model.body_dofadr[self.hose_bodies]
-        return slice(int(addresses[0]), int(addresses[-1] + self.model.body_dofnum[self.hose_bodies[-1]]))
-
-    def _fit(self, curve: Array, places: Array) -> Array:
-        """Nodes (K + 1, 3) near a curve (n, 3) even in arc length that meet places, m."""
-        even = np.linspace(0.0, self.nodes[-1], len(curve))
-        points = np.stack([np.interp(self.nodes, even, curve[:, c]) for c in range(3)], axis=1)
-        lengths = np.diff(self.nodes)
-        pins = []
-        for s, place in zip(self.arc_lengths, places, strict=True):
-            piece = int(np.clip(np.searchsorted(self.nodes, s, "right") - 1, 0, len(lengths) - 1))
-            pins.append(Pin(piece, float((s - self.nodes[piece]) / lengths[piece]), place))
-        return fit_chain(points, lengths, pins)
-
-    def _compile(self, maker: mujoco.MjSpec) -> mujoco.MjModel:
-        try:
-            return maker.compile()
-        except ValueError as error:
-            valid = f"one that takes a {self.hose_model} hose (MuJoCo: {' '.join(str(error).split())})"
-            raise InputError("scene", str(self.scene.path), valid) from error

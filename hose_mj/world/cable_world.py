@@ -103,10 +103,15 @@ class CableWorld(MujocoWorld):
         return maker
 
     def _finish_model(self, spec: HoseSpec, model: mujoco.MjModel) -> None:
-        """Keeps the first segment from rolling about its axis, as a coupling does."""
+        """Keeps the first segment from rolling about its axis, as a coupling does.
+
+        MuJoCo's solver measures its errors by the model's mean inertia; that stays as it was.
+        """
+        scale = model.stat.meaninertia
         roll = int(model.body_dofadr[self.hose_bodies[0]]) + 3
         model.dof_armature[roll] = spec.mass * spec.length**2
         mujoco.mj_setConst(model, mujoco.MjData(model))
+        model.stat.meaninertia = scale
 
     def _lay(self, nodes: Array) -> None:
         frames = transport_frames(nodes, self._kind.base_frame)

@@ -40,8 +40,8 @@ class Numerics:
         check_count("substeps", self.substeps, 1)
 
     def tie_options(self) -> dict[str, list[float]]:
-        """solref (two of the world's steps, critically damped) and solimp of ties and edges."""
-        return {"solref": [2.0 * self.timestep, 1.0], "solimp": HARD}
+        """solref (two of MuJoCo's steps, critically damped) and solimp of ties and edges."""
+        return {"solref": [2.0 * self.inner_step, 1.0], "solimp": HARD}
 
     @property
     def inner_step(self) -> float:

@@ -20,7 +20,9 @@ from hose_mj.world.mujoco_scene import Numerics
 from hose_mj.world.mujoco_world import MujocoWorld
 
 _SAFETY = 0.5
-"""Of MuJoCo's default step over the largest stable one of an undamped free chain."""
+"""Of MuJoCo's default step over the largest stable one of a free chain."""
+_LONGEST = 5e-4
+"""Largest default step of MuJoCo's (s): a taut chain that jerks is stiff, whatever bends it."""
 
 _HIDDEN = 4
 """Group of geoms that viewers do not draw unless asked."""
@@ -29,10 +31,12 @@ _HIDDEN = 4
 class CableWorld(MujocoWorld):
     """Robots on a chain of rigid segments with ball joints (see `CableHose`).
 
-    The elastic forces are explicit, so MuJoCo's step must be small: of the order of h^2 in the
-    length h of a segment. A step of the world therefore is several of MuJoCo's, each half as long
-    as an undamped chain could bear. The integrator is implicitfast, which takes dampings
-    implicitly.
+    The elastic forces are explicit, so that a hose with little damping needs small steps, of the
+    order of h^2 in the length h of a segment. A step of the world therefore is several of MuJoCo's,
+    each at most 0.5 ms and half as long as a free chain can bear. The integrator is "discrete",
+    whatever the scene says: all others leave the joints' implicit damping out of constraint forces,
+    and such a hose lets go of its robots. The first segment does not roll about its axis, or
+    friction would set the whole hose spinning.
 
     Args:
         scene: checked.
@@ -66,7 +70,8 @@ class CableWorld(MujocoWorld):
         self._kind = BallJoints(spec, twist)
         self._held = self._locate_holds(scene)
         if substeps is None:
-            most = _SAFETY * find_stable_step(spec, self._layout.segment_length, twist)
+            stable = find_stable_step(spec, self._layout.segment_length, twist)
+            most = min(_LONGEST, _SAFETY * stable)
             substeps = math.ceil(timestep / most * (1.0 - 1e-9))
         nodes = self._layout.nodes.copy()
         nodes[-1] = spec.length
@@ -136,17 +141,24 @@ class CableWorld(MujocoWorld):
 
 
 def find_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffness: float) -> float:
-    """Largest stable step (s) of a free, undamped chain of rigid links with explicit joint forces.
+    """Largest stable step (s) of a free chain of rigid links with explicit joint stiffness.
 
-    The smaller one of those of bending and twist (docs/mujoco_cable.md, "Time step").
+    Undamped, 2 / omega for the fastest motion of bending or twist (docs/mujoco_cable.md, "Time
+    step"). Damping taken implicitly, with a relaxation time T, bears
+    dt = T + sqrt(T^2 + (2 / omega)^2): Jury's condition for v' = (v - dt omega^2 x) /
+    (1 + dt omega^2 T), x' = x + dt v'. A ball joint has one damping, tau EI / h, so of the twist
+    T is tau EI / GJ.
 
     Args:
         spec: the hose.
         segment_length: h (m).
         torsional_stiffness: GJ (N m^2).
     """
-    h, density = segment_length, spec.linear_density
-    bend = h**2 / (2.0 * math.sqrt(3.0)) * math.sqrt(density / spec.bending_stiffness)
-    if torsional_stiffness == 0.0:
-        return bend
-    return min(bend, h * spec.radius * math.sqrt(density / (2.0 * torsional_stiffness)))
+    h, density, stiffness = segment_length, spec.linear_density, spec.bending_stiffness
+    bend = h**2 / (2.0 * math.sqrt(3.0)) * math.sqrt(density / stiffness)
+    steps = [spec.damping_time + math.hypot(spec.damping_time, bend)]
+    if torsional_stiffness > 0.0:
+        twist = h * spec.radius * math.sqrt(density / (2.0 * torsional_stiffness))
+        relaxation = spec.damping_time * stiffness / torsional_stiffness
+        steps.append(relaxation + math.hypot(relaxation, twist))
+    return min(steps)

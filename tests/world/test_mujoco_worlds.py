@@ -157,9 +157,9 @@ def test_a_restored_world_goes_on_bit_by_bit(model):
     s = np.linspace(0.0, world.scene.spec.length, 9)
 
     def read():
-        return [world.data.qpos.copy(), world.data.qvel.copy(), world.attachment_forces()] + [
-            *(world.tension(s), world.position(s), world.velocity(s), world.site_positions())
-        ]
+        told = [world.attachment_forces(), world.site_positions()]
+        told += [ask(s) for ask in (world.tension, world.position, world.velocity)]
+        return [world.data.qpos.copy(), world.data.qvel.copy(), *told]
 
     world.step(15)
     first = read()
@@ -187,9 +187,9 @@ def test_friction_holds_a_hose_on_a_slope_below_its_angle(make, model):
         assert world.position(world.nodes)[:, 2].min() > 0.009
         ways[friction] = np.abs(world.position(world.nodes) - start).max()
     assert ways[0.3] < 3e-3
-    # The free end, 0.2 m long, goes down the slope by half a t^2 at first, a = g_y - friction g_z.
-    assert 0.01 < ways[0.1] < 0.75 * ways[0.0]
-    assert ways[0.0] < 0.5 * 1.92 * 0.2**2 * 1.5
+    # Nothing goes further than free fall along the slope.
+    assert ways[0.3] < 0.5 * ways[0.1] < 0.5 * 0.93 * ways[0.0]
+    assert ways[0.0] < 0.5 * 1.92 * 0.2**2
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -207,7 +207,7 @@ def test_a_box_carries_what_lies_on_it(make, model):
 
 def test_a_chain_is_fitted_to_its_pins():
     rng = np.random.default_rng(3)
-    steps = rng.normal(size=(12, 3)) + [2.0, 0.0, 0.0]
+    steps = rng.normal(size=(12, 3)) + np.array([2.0, 0.0, 0.0])
     points = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     lengths = np.full(12, 2.5)
     pins = [Pin(0, 0.0, np.array([0.1, 0.0, 0.0])), Pin(7, 0.25, points[7] + 0.2)]

@@ -142,8 +142,7 @@ def compute_equality_reaction(
     The force is the constraint's first three rows. The rows of a weld's rotation are in a frame of
     MuJoCo's own, so the moment is the one that gives the constraint's generalised force.
     """
-    number = model.equality(f"hold{held.hold.number}").id
-    mine = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == number)
+    mine = find_rows(data, model.equality(f"hold{held.hold.number}").id)
     force = data.efc_force[mine][:3].copy()
     if not held.hold.fixes_tangent:
         return Reaction(force, np.zeros(3))
@@ -154,6 +153,13 @@ def compute_equality_reaction(
     mujoco.mj_jac(model, data, linear, angular, point, body)
     moment = np.linalg.lstsq(angular.T, generalized - linear.T @ force, rcond=1e-9)[0]
     return Reaction(force, moment)
+
+
+def find_rows(data: mujoco.MjData, equality: int) -> np.ndarray:
+    """Which of MuJoCo's constraint rows (nefc,) are those of an equality constraint."""
+    return np.asarray(
+        (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == equality)
+    )
 
 
 def compute_root_reaction(data: mujoco.MjData, held: Held, body: int) -> Reaction:

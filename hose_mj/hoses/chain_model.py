@@ -67,10 +67,7 @@ class ChainModel(MujocoModel):
         maker, bodies = kind.make_chain(self.layout, root)
         settings.apply(maker.option)
         add_obstacles(maker, bodies, settings.obstacles, settings.timestep)
-        for k, body in enumerate(bodies):
-            body.explicitinertial = True
-            body.mass, body.inertia = max(self.mass.mass[k], 1e-300), self.mass.inertia[k]
-            body.ipos, body.iquat = self.mass.centre[k], [1.0, 0.0, 0.0, 0.0]
+        self.mass.write(bodies)
         for item in held:
             if not item.rigid:
                 (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
@@ -178,9 +175,8 @@ class ChainModel(MujocoModel):
 
     def tension(self, arc_lengths: Array) -> Array:
         """Axial force in the joints, straight lines between and beyond them."""
-        tangents = self.motion().tangent(self.layout.nodes[1:-1])
-        on_rest = self.data.cfrc_int[self.bodies[1:], 3:]
-        return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
+        at_joints = self.motion().joint_tensions(self.data, self.bodies)
+        return self.layout.interpolate(arc_lengths, at_joints)
 
     def torque(self, arc_lengths: Array) -> Array:
         """Moment about the mean of the tangents on both sides of a joint, damping included."""

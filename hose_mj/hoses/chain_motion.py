@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -34,6 +35,13 @@ class ChainMass:
         about = mass * radius**2 / 2
         across = np.maximum(mass * (end - begin) ** 2 / 12, about / 2 * (1 + 1e-9))
         return cls(mass, centre, np.stack([about, across, across], axis=1))
+
+    def write(self, bodies: Sequence[mujoco.MjsBody]) -> None:
+        """Gives the bodies of a model that is being made these masses."""
+        for k, body in enumerate(bodies):
+            body.explicitinertial = True
+            body.mass, body.inertia = max(self.mass[k], 1e-300), self.inertia[k]
+            body.ipos, body.iquat = self.centre[k], [1.0, 0.0, 0.0, 0.0]
 
 
 @dataclass(frozen=True)
@@ -108,6 +116,11 @@ class ChainMotion:
         """Angle about the tangent over segment length (k,), rad/m."""
         turns = self.joint_rotations()[:, 0]
         return self.layout.interpolate(arc_lengths, turns / self.layout.segment_length)
+
+    def joint_tensions(self, data: mujoco.MjData, bodies: np.ndarray) -> Array:
+        """Axial force in the joints (N - 1,), N, after MuJoCo's `mj_rnePostConstraint`."""
+        tangents = self.tangent(self.layout.nodes[1:-1])
+        return np.asarray(-np.einsum("ni,ni->n", data.cfrc_int[bodies[1:], 3:], tangents))
 
     def frame(self, arc_length: float) -> Array:
         """Frame (4,) of the segment there."""

@@ -11,7 +11,7 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.hoses.obstacles import Obstacle
 
-_IMPEDANCE_RATIO = 10.0
+IMPEDANCE_RATIO = 10.0
 """MuJoCo's impratio: how much harder friction is than the normal force; 1 lets contacts slip."""
 
 
@@ -37,7 +37,7 @@ def add_obstacles(
     if not obstacles:
         return
     maker.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    maker.option.impratio = _IMPEDANCE_RATIO
+    maker.option.impratio = IMPEDANCE_RATIO
     solref = [2.0 * timestep, 1.0]
     for body in bodies:
         for geom in body.geoms:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.chain_holds import Held, Load
+from hose_mj.hoses.chain_holds import Held, Load, find_rows
 from hose_mj.hoses.chain_layout import rotation_matrix
 from hose_mj.hoses.flex_layout import FlexLayout, interpolate
 from hose_mj.hoses.flex_motion import FlexMotion
@@ -47,7 +47,8 @@ class FlexModel(MujocoModel):
         self._bending_stiffness = spec.bending_stiffness
         self._rest = np.zeros((len(self.masses), 3))
         self._rest[:, 0] = self.layout.nodes
-        maker = make_rod(spec, settings, self._rest, self.masses)
+        maker = make_rod(spec, self._rest, self.masses, settings.edge_options())
+        settings.apply(maker.option)
         self._ballast = BALLAST * spec.mass
         for item in held:
             for vertex in self.layout.find_vertices(item.hold):
@@ -234,9 +235,7 @@ class FlexModel(MujocoModel):
 
     def _find_rows(self, name: str) -> Array:
         """Forces of an equality constraint's rows."""
-        data, number = self.data, self.model.equality(name).id
-        mine = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == number)
-        return np.array(data.efc_force[mine])
+        return np.array(self.data.efc_force[find_rows(self.data, self.model.equality(name).id)])
 
     def _find_free_edges(self, held: Sequence[Held]) -> np.ndarray:
         free = np.ones(len(self.layout.edges), dtype=bool)

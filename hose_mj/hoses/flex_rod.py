@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -44,25 +44,28 @@ class FlexSettings(ChainSettings):
         return options | {"solimp": list(self.edge_solimp)}
 
 
-def make_rod(spec: HoseSpec, settings: FlexSettings, rest: Array, masses: Array) -> mujoco.MjSpec:
+def make_rod(
+    spec: HoseSpec, rest: Array, masses: Array, edge_options: Mapping[str, object]
+) -> mujoco.MjSpec:
     """Vertices on slides, MuJoCo's bending between them, edges that keep their lengths.
 
     MuJoCo multiplies `young` by the section of a solid cylinder of the flex's radius; `damping` is
-    the Kelvin-Voigt time.
+    the Kelvin-Voigt time. Nothing collides.
+
+    Args:
+        spec: what the hose is made of.
+        rest: straight shape (N + 1, 3), m.
+        masses: of the vertices (N + 1,), kg.
+        edge_options: solref and solimp of the edges.
     """
     maker = mujoco.MjSpec()
-    settings.apply(maker.option)
     for k, (place, mass) in enumerate(zip(rest, masses, strict=True)):
         body = maker.worldbody.add_body(name=f"v{k}", pos=place)
         body.explicitinertial = True
         body.mass, body.inertia = mass, [mass * spec.radius**2] * 3
         for axis in np.eye(3):
             body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    rod = maker.add_flex(name="hose", dim=1, radius=spec.radius)
-    rod.contype, rod.conaffinity, rod.selfcollide = 0, 0, mujoco.mjtFlexSelf.mjFLEXSELF_NONE
-    rod.vertbody = [f"v{k}" for k in range(len(rest))]
-    rod.vert = [0.0] * (3 * len(rest))
-    rod.elem = [vertex for k in range(len(rest) - 1) for vertex in (k, k + 1)]
+    rod = add_edges(maker, "hose", range(len(rest)), spec.radius)
     rod.young = spec.bending_stiffness / (math.pi * spec.radius**4 / 4)
     rod.poisson, rod.damping = 0.0, spec.damping_time
     maker.add_equality(
@@ -70,9 +73,21 @@ def make_rod(spec: HoseSpec, settings: FlexSettings, rest: Array, masses: Array)
         type=mujoco.mjtEq.mjEQ_FLEX,
         objtype=mujoco.mjtObj.mjOBJ_FLEX,
         name1="hose",
-        **settings.edge_options(),
+        **edge_options,
     )
     return maker
+
+
+def add_edges(
+    maker: mujoco.MjSpec, name: str, vertices: Sequence[int], radius: float
+) -> mujoco.MjsFlex:
+    """Adds a flex of edges between consecutive vertices; nothing in it acts or collides yet."""
+    flex = maker.add_flex(name=name, dim=1, radius=radius)
+    flex.contype, flex.conaffinity, flex.selfcollide = 0, 0, mujoco.mjtFlexSelf.mjFLEXSELF_NONE
+    flex.vertbody = [f"v{k}" for k in vertices]
+    flex.vert = [0.0] * (3 * len(vertices))
+    flex.elem = [vertex for k in range(len(vertices) - 1) for vertex in (k, k + 1)]
+    return flex
 
 
 def name_hold(held: Held, vertex: int) -> str:

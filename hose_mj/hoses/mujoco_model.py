@@ -69,7 +69,6 @@ class MujocoModel(ABC):
         self.targets_ahead = True
         self.settled: dict[int, Load] = {}
         self._lead, self._advice = lead, advice
-        self._warnings = [self.data.warning[kind] for kind in _BAD]
         self._forces_known = False
         # State before the last step where that moved holds; its targets are those of the data.
         self._replay: Array | None = None
@@ -222,10 +221,8 @@ class MujocoModel(ABC):
             self._run(n_steps, loads)
         self.forget()
         self._replay = before if moving and n_steps == 0 else None
-        if any(warning.number for warning in self._warnings):
+        if went_bad(self.data):
             time = self.data.time
-            for warning in self._warnings:
-                warning.number = 0
             self.set_numbers(before)
             raise StepError(
                 f"MuJoCo met a NaN or a huge number within {n_steps} steps from time "
@@ -235,7 +232,7 @@ class MujocoModel(ABC):
 
     def _run(self, n_steps: int, loads: Sequence[Load]) -> None:
         """Steps MuJoCo; loads follow the hose."""
-        with _mute_warnings():
+        with mute_warnings():
             if not loads:
                 mujoco.mj_step(self.model, self.data, n_steps)
                 return
@@ -244,8 +241,16 @@ class MujocoModel(ABC):
                 mujoco.mj_step(self.model, self.data)
 
 
+def went_bad(data: mujoco.MjData) -> bool:
+    """Whether MuJoCo met a NaN or a huge number, and so reset itself, since the last call."""
+    met = [warning for kind in _BAD if (warning := data.warning[kind]).number]
+    for warning in met:
+        warning.number = 0
+    return bool(met)
+
+
 @contextmanager
-def _mute_warnings() -> Iterator[None]:
+def mute_warnings() -> Iterator[None]:
     """Keeps MuJoCo from printing and from leaving a log file: the caller raises one clear error."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)

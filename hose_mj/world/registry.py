@@ -7,10 +7,12 @@ from typing import Any
 
 from hose_mj.errors import InputError
 from hose_mj.scenes.mjcf import Scene, find_scene, read_scene
+from hose_mj.world.cable_world import CableWorld
+from hose_mj.world.flex_world import FlexWorld
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.world import World
 
-WORLDS: dict[str, type[World]] = {"geds": GedsWorld}
+WORLDS: dict[str, type[World]] = {"geds": GedsWorld, "cable": CableWorld, "flex": FlexWorld}
 
 
 def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -> World:

@@ -1,0 +1,102 @@
+"""`FlexWorld`: MuJoCo's 1-D flex among the bodies of a scene."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from hose_mj.hoses.chain_holds import find_rows
+from hose_mj.hoses.flex_layout import FlexLayout
+from hose_mj.hoses.flex_motion import FlexMotion
+from hose_mj.hoses.flex_rod import add_edges, make_rod
+from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.model import Array, Hold
+from hose_mj.hoses.spec import HoseSpec
+from hose_mj.scenes.mjcf import Scene
+from hose_mj.world.hose_contact import HoseContact
+from hose_mj.world.mujoco_scene import PREFIX, Numerics
+from hose_mj.world.mujoco_world import MujocoWorld
+
+
+class FlexWorld(MujocoWorld):
+    """Robots on point masses joined by edges (see `FlexHose`).
+
+    The integrator is "discrete", whatever the scene says: no other takes the bending implicitly.
+    The hose has no twist. Edges are soft constraints: `stretch` says how much they give. A contact
+    is one of an edge, a capsule, with a geom (with a plane, of its two vertices); its force goes to
+    the edge's vertices.
+
+    Args:
+        scene: checked.
+        timestep: length of one step of the world (s); None for the scene's.
+        segments: number of edges, at least 2; attachments that are no vertex may change it by a
+            few.
+        substeps: MuJoCo's steps in one of the world's.
+
+    Raises:
+        InputError: a value outside its valid set; attachments less than half an edge apart; a hose
+            with drag, fittings or a rest shape.
+    """
+
+    hose_model = "flex"
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        timestep: float | None = None,
+        segments: int = 40,
+        substeps: int = 1,
+    ) -> None:
+        check_count("segments", segments, 2)
+        places = (*(robot.arc_length for robot in scene.robots), 0.0)
+        holds = [Hold(k, s, False) for k, s in enumerate(places)]
+        length = scene.spec.length
+        self._layout = FlexLayout.of_holds(length, segments, holds, clamp_correction=False)
+        self._held = [int(self._layout.find_vertices(hold)[0]) for hold in holds]
+        self._rest = np.zeros((len(self._layout.nodes), 3))
+        self._rest[:, 0] = self._layout.nodes
+        timestep = scene.timestep if timestep is None else timestep
+        numerics = Numerics(timestep, substeps, "discrete", "sparse")
+        super().__init__(scene, self._layout.nodes, numerics)
+
+    def stretch(self) -> Array:
+        """Strain of the edges (K,); 0 if MuJoCo's constraints were rigid."""
+        return self._read_motion().stretch()
+
+    def _make_hose(
+        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
+    ) -> mujoco.MjSpec:
+        """Bending and edges are those of one flex; others over the same vertices collide."""
+        masses = self._layout.compute_masses(spec.linear_density)
+        maker = make_rod(spec, self._rest, masses, ties)
+        changes = np.flatnonzero(np.diff(contact.bits)) + 1
+        for k, run in enumerate(np.split(np.arange(len(contact.bits)), changes)):
+            vertices = range(int(run[0]), int(run[-1]) + 2)
+            touching = add_edges(maker, f"contact{k}", vertices, spec.radius)
+            contact.write(touching, int(contact.bits[run[0]]) | contact.plane_bit)
+        for k, vertex in enumerate(self._held):
+            maker.body(f"v{vertex}").add_site(name=f"hold{k}")
+        return maker
+
+    def _lay(self, nodes: Array) -> None:
+        first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]
+        self.data.qpos[first : first + nodes.size] = (nodes - self._rest).ravel()
+
+    def _read_motion(self) -> FlexMotion:
+        first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]
+        moved = self.data.qpos[first : first + self._rest.size].reshape(-1, 3)
+        speeds = self.data.qvel[self._joints].reshape(-1, 3).copy()
+        return FlexMotion(self._layout, self._rest + moved, speeds)
+
+    def _read_tensions(self) -> Array:
+        edges = find_rows(self.data, self.model.equality(f"{PREFIX}edges").id)
+        return np.array(-self.data.efc_force[edges])
+
+    @property
+    def _tension_places(self) -> Array:
+        return np.asarray((self.nodes[:-1] + self.nodes[1:]) / 2)
+
+    @property
+    def _advice(self) -> str:
+        return "try a smaller timestep, or more substeps"

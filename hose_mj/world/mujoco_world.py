@@ -1,0 +1,229 @@
+"""`MujocoWorld`: a hose that is part of the scene's own mjModel, tied to robots and source.
+
+cable_world.py and flex_world.py say what the hose is made of. MuJoCo solves bodies, hose, the ties
+between them and all contacts in one step.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError, StepError
+from hose_mj.hoses.chain_holds import find_rows
+from hose_mj.hoses.flex_layout import interpolate
+from hose_mj.hoses.inputs import check_arc_lengths, check_count
+from hose_mj.hoses.model import Array
+from hose_mj.hoses.mujoco_chain import check_plain
+from hose_mj.hoses.mujoco_model import Motion, mute_warnings, went_bad
+from hose_mj.hoses.spec import HoseSpec
+from hose_mj.scenes.mjcf import Scene
+from hose_mj.world.centre_line import CentreLine
+from hose_mj.world.chain_fit import fit_curve
+from hose_mj.world.hose_contact import HoseContact, open_scene
+from hose_mj.world.laying import lay_hose
+from hose_mj.world.mujoco_scene import PREFIX, Numerics, join_hose
+from hose_mj.world.world import World
+
+
+class MujocoWorld(World):
+    """A scene with a hose of straight pieces between nodes among its bodies.
+
+    The scene's own option for integrator, solver, Jacobian, friction cone and impratio are
+    replaced; the rest of it is as the scene says. Site-to-site `connect` constraints tie the hose
+    to the robots and the source. It touches the geoms that a geom of contype and conaffinity 1
+    would touch, with the scene's friction for the hose; not itself, and not the geoms of a robot
+    within three of its radii of arc from its attachment (hose_contact.py).
+
+    Args:
+        scene: checked.
+        nodes: arc lengths of the hose's nodes (K + 1,), m, from 0 to L.
+        numerics: how it is stepped.
+
+    Attributes:
+        nodes: as given.
+        substeps: MuJoCo's steps in one of the world's.
+        hose_bodies: ids of the hose's bodies, from the source to the tip.
+        start_gap: largest distance between a robot's site (or the source) and the hose after a
+            reset (m); above rounding only where a chain of straight pieces cannot reach.
+
+    Raises:
+        InputError: a value outside its valid set, a hose or a scene that MuJoCo cannot model.
+    """
+
+    def __init__(self, scene: Scene, nodes: Array, numerics: Numerics) -> None:
+        check_plain(type(self).__name__, scene.spec)
+        self.nodes, self.substeps = nodes, numerics.substeps
+        self._timestep = numerics.timestep
+        maker = scene.make_spec()
+        numerics.apply(maker.option)
+        contact, obstacles = open_scene(scene, maker, nodes, numerics.timestep)
+        hose = self._make_hose(scene.spec, contact, numerics.tie_options())
+        model, self.hose_bodies = join_hose(scene, maker, hose, numerics.tie_options())
+        self._finish_model(scene.spec, model)
+        super().__init__(scene, model)
+        first = int(model.body_dofadr[self.hose_bodies[0]])
+        self._joints = slice(first, first + int(model.body_dofnum[self.hose_bodies].sum()))
+        self._holds = [model.equality(f"{PREFIX}hold{k}").id for k in range(len(self.arc_lengths))]
+        self._motion: Motion | None = None
+        self._forces = np.zeros((len(self.arc_lengths), 3))
+        self._tensions = np.zeros(0)
+        self._start_bodies()
+        places = self.site_positions()
+        curve = lay_hose(
+            scene.spec, places, self.arc_lengths, obstacles, np.array(self.model.opt.gravity)
+        )
+        self._start = fit_curve(curve, nodes, self.arc_lengths, places)
+        self.reset()
+        met = self.position(self.arc_lengths) - self.site_positions()
+        self.start_gap = float(np.linalg.norm(met, axis=1).max())
+
+    # -- what each kind of hose says for itself ----------------------------------------------------
+
+    @abstractmethod
+    def _make_hose(
+        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
+    ) -> mujoco.MjSpec:
+        """A model of the hose alone, with sites hold0, hold1, ... for robots and source.
+
+        Args:
+            spec: the hose.
+            contact: how it touches the scene.
+            ties: solref and solimp of equality constraints.
+        """
+
+    def _finish_model(self, spec: HoseSpec, model: mujoco.MjModel) -> None:
+        """Sets what can be set in a compiled model only."""
+
+    @abstractmethod
+    def _lay(self, nodes: Array) -> None:
+        """Writes the qpos of the hose with its nodes at (K + 1, 3), m."""
+
+    @abstractmethod
+    def _read_motion(self) -> Motion:
+        """How the hose lies and moves now."""
+
+    @abstractmethod
+    def _read_tensions(self) -> Array:
+        """Tensions in MuJoCo's last step, where `_tension_places` says."""
+
+    @property
+    @abstractmethod
+    def _tension_places(self) -> Array:
+        """Arc lengths where tensions are known (m)."""
+
+    @property
+    @abstractmethod
+    def _advice(self) -> str:
+        """What to try where the hose is unstable."""
+
+    # -- the world's protocol ----------------------------------------------------------------------
+
+    @property
+    def timestep(self) -> float:
+        """Length of one step (s); MuJoCo takes `substeps` steps in it."""
+        return self._timestep
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the last reset (s)."""
+        return float(self.data.time)
+
+    def reset(self) -> None:
+        """See `World.reset`; forces and tensions are those of the first instant."""
+        self._start_bodies()
+        self._lay(self._start)
+        self.data.qvel[self._joints] = 0.0
+        with mute_warnings():
+            mujoco.mj_forward(self.model, self.data)
+        self._forces, self._tensions = self._find_hold_forces(), self._read_tensions()
+        self._finish()
+
+    def step(self, n_steps: int = 1) -> None:
+        """See `World.step`."""
+        check_count("n_steps", n_steps, 0)
+        if not np.all(np.isfinite(self.control)):
+            raise InputError("control", self.control.tolist(), "finite numbers")
+        for _ in range(n_steps):
+            self._advance()
+
+    def position(self, arc_length: ArrayLike) -> Array:
+        """See `World.position`; straight between the nodes."""
+        return self._move().position(self._check(arc_length))
+
+    def velocity(self, arc_length: ArrayLike) -> Array:
+        """See `World.velocity`."""
+        return self._move().velocity(self._check(arc_length))
+
+    def tension(self, arc_length: ArrayLike) -> Array:
+        """See `World.tension`; straight lines between robots, each of whom makes it jump."""
+        s = self._check(arc_length)
+        ends = np.unique([0.0, *self.arc_lengths, self.scene.spec.length])
+        stretch = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(ends) - 2)
+        places, found = self._tension_places, np.zeros(len(s))
+        for k in np.unique(stretch):
+            inside = (places > ends[k]) & (places < ends[k + 1])
+            if not inside.any():
+                inside[np.argmin(np.abs(places - (ends[k] + ends[k + 1]) / 2))] = True
+            mine = stretch == k
+            found[mine] = interpolate(s[mine], places[inside], self._tensions[inside])
+        return found
+
+    def centre_line(self) -> CentreLine:
+        """See `World.centre_line`: straight pieces between the nodes."""
+        return CentreLine.of_chain(self.nodes, self._move().position(self.nodes))
+
+    def attachment_forces(self) -> Array:
+        """See `World.attachment_forces`: means over the substeps of the last step."""
+        return self._forces.copy()
+
+    def hose_snapshot(self) -> dict[str, Any]:
+        """See `World.hose_snapshot`: forces and tensions of the last step."""
+        return {"forces": self._forces.copy(), "tensions": self._tensions.copy()}
+
+    def restore_hose(self, state: dict[str, Any]) -> None:
+        """See `World.restore_hose`."""
+        self._forces, self._tensions = state["forces"].copy(), state["tensions"].copy()
+        self._motion = None
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _advance(self) -> None:
+        """One step of the world; on a `StepError` the state is the one before."""
+        before = self.snapshot()
+        self._write_inputs()
+        total = np.zeros_like(self._forces)
+        with mute_warnings():
+            for _ in range(self.substeps):
+                mujoco.mj_step(self.model, self.data)
+                total += self._find_hold_forces()
+        if went_bad(self.data):
+            self.restore(before)
+            raise StepError(
+                f"MuJoCo met a NaN or a huge number in the step from time {self.time:g} s at "
+                f"timestep {self.timestep:g} s in {self.substeps} substeps: {self._advice}"
+            )
+        self._forces, self._tensions = total / self.substeps, self._read_tensions()
+        self._finish()
+
+    def _finish(self) -> None:
+        """Makes all that can be asked follow qpos and qvel."""
+        self._motion = None
+        self._update_poses()
+
+    def _move(self) -> Motion:
+        if self._motion is None:
+            self._motion = self._read_motion()
+        return self._motion
+
+    def _check(self, arc_length: ArrayLike) -> Array:
+        return check_arc_lengths(arc_length, self.scene.spec.length)
+
+    def _find_hold_forces(self) -> Array:
+        """Forces of the ties on the hose in MuJoCo's last step (N + 1, 3), N."""
+        force = self.data.efc_force
+        return np.stack([force[find_rows(self.data, k)] for k in self._holds])

@@ -1,0 +1,209 @@
+"""`Monitor`: the signed margins of a world, and the breaks as they happen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from hose_mj.compiled import compile_notice
+from hose_mj.constraints import margin_kernels as kernels
+from hose_mj.constraints.breaks import (
+    BOUNDS,
+    COLLISION,
+    KINDS,
+    OBSTACLE,
+    RUN_OVER,
+    STRETCH,
+    UNITS,
+    Break,
+)
+from hose_mj.constraints.footprints import find_footprint, find_obstacles
+from hose_mj.constraints.hose_probe import HoseProbe
+from hose_mj.constraints.limits import Limits
+from hose_mj.constraints.margin_tables import make_tables
+from hose_mj.hoses.geds.shapes import KIND
+from hose_mj.hoses.model import Array
+from hose_mj.world.centre_line import CentreLine
+from hose_mj.world.world import World
+
+
+@dataclass(frozen=True)
+class _Measurement:
+    """Margins (M,), their places (M, 3), what they are about (M,), and when (s)."""
+
+    margins: Array
+    places: Array
+    others: NDArray[np.int64]
+    time: float
+
+
+class Monitor:
+    """Watches a world; docs/constraints.md says what each margin is.
+
+    Args:
+        world: as it stands; what its robots stand on now is no obstacle to them.
+        limits: None for the defaults.
+
+    Attributes:
+        world, limits: as given.
+        names: of the margins (M): "stretch 0", "run-over 1", "collision 0-1", "bounds 0",
+            "obstacle 2". Without finite bounds or obstacles there are no such margins.
+        kinds, units: of each margin; units are N for stretch and m for the others.
+        limit_texts: what each margin is measured against, in words.
+        breaks: all that the last `check` or `reset` found, the earliest first.
+
+    Raises:
+        InputError: a robot without geoms, or limits that name a geom that is not there.
+    """
+
+    def __init__(self, world: World, limits: Limits | None = None) -> None:
+        self.world, self.limits = world, limits or Limits()
+        footprints = [find_footprint(world, i) for i in range(world.n_robots)]
+        obstacles = find_obstacles(world, footprints, self.limits.ground)
+        self._tables = make_tables(world, self.limits, footprints, obstacles)
+        self._probe = self._make_probe(world.centre_line().arc_lengths)
+        self._pairs = list(combinations(range(world.n_robots), 2))
+        self.kinds = tuple(np.repeat(KINDS, np.diff(self._tables.starts)).tolist())
+        self.names = tuple(self._name(m) for m in range(len(self.kinds)))
+        self.units = tuple(UNITS[kind] for kind in self.kinds)
+        texts = self._make_limit_texts()
+        self.limit_texts = tuple(texts[kind] for kind in self.kinds)
+        self.breaks: tuple[Break, ...] = ()
+        with compile_notice("margins of constraints"):
+            self.reset()
+
+    # -- measuring ---------------------------------------------------------------------------------
+
+    def measure(self) -> Array:
+        """Margins (M,) of the world as it stands, N or m: positive is fine, 0 the limit."""
+        return self._measure().margins
+
+    def check(self) -> Break | None:
+        """Returns the earliest limit crossed since the last call; to be called after every step.
+
+        A limit is crossed when its margin was not below zero and is now. Time and place are
+        interpolated between the two; all that were crossed are in `breaks`. The first call after
+        `reset` also returns what was broken from the start. A world whose clock went back counts as
+        reset.
+        """
+        before, now = self._last, self._measure()
+        if now.time < before.time:
+            self.reset()
+            before = self._last
+        self._last = now
+        crossed = np.flatnonzero((now.margins < 0.0) & (before.margins >= 0.0))
+        found = [self._make_break(int(m), before, now) for m in crossed]
+        self.breaks = (*self._pending, *sorted(found, key=lambda one: one.time))
+        self._pending = ()
+        return self.breaks[0] if self.breaks else None
+
+    def reset(self) -> Break | None:
+        """Starts anew with the world as it stands; returns a limit that is broken already."""
+        self._last = self._measure()
+        broken = np.flatnonzero(self._last.margins < 0.0)
+        found = [self._make_break(int(m), self._last, self._last) for m in broken]
+        self.breaks = self._pending = tuple(found)
+        return found[0] if found else None
+
+    def _measure(self) -> _Measurement:
+        t, world = self._tables, self.world
+        line = world.centre_line()
+        queued = kernels.measure_margins(
+            *(t, (line.arc_lengths, line.coefficients), world.tension(t.samples)),
+            *(world.site_positions(), (world.data.geom_xpos, world.data.geom_xmat)),
+        )
+        if queued:
+            self._measure_pairs(queued)
+        if self._probe is not None:
+            self._measure_probe(self._probe, line)
+        return _Measurement(t.margins.copy(), t.places.copy(), t.others.copy(), world.time)
+
+    def _measure_pairs(self, queued: int) -> None:
+        """Lets MuJoCo measure the pairs of geoms that may be nearer than what is known."""
+        t, model, data = self._tables, self.world.model, self.world.data
+        ends = np.zeros(6)
+        for q in np.argsort(t.gaps[:queued]):
+            a, b, m = t.near[q]
+            clearance = t.clearances[1 if m < t.starts[3] else 3]
+            most = t.margins[m] + clearance
+            if t.gaps[q] >= most:
+                continue
+            found = mujoco.mj_geomDistance(model, data, t.ids[a], t.ids[b], most, ends)
+            if found < most:
+                t.margins[m], t.places[m] = found - clearance, 0.5 * (ends[:3] + ends[3:])
+                if m >= t.starts[4]:
+                    t.others[m] = b
+
+    def _measure_probe(self, probe: HoseProbe, line: CentreLine) -> None:
+        """Lets MuJoCo measure the hose's distance from geoms whose shape only it knows."""
+        t = self._tables
+        for i in range(self.world.n_robots):
+            m = int(t.starts[1]) + i
+            stretches = ((0.0, float(t.own[i, 0])), (float(t.own[i, 1]), line.arc_lengths[-1]))
+            for row in range(t.robot_rows[i], t.robot_rows[i + 1]):
+                for low, high in stretches:
+                    if t.rows[row, KIND] != kernels.OTHER_KIND or low >= high:
+                        continue
+                    most = t.margins[m] + t.clearances[0]
+                    distance, arc, place = probe.measure(
+                        self.world.data, int(t.ids[row]), line, (low, high), most
+                    )
+                    if distance < most:
+                        t.margins[m], t.places[m] = distance - t.clearances[0], place
+                        t.others[m] = int(np.sum(arc < t.segments[1:-1]))
+
+    # -- what was found ----------------------------------------------------------------------------
+
+    def _make_break(self, m: int, before: _Measurement, now: _Measurement) -> Break:
+        fall, step = before.margins[m] - now.margins[m], now.time - before.time
+        part = before.margins[m] / fall if fall > 0.0 else 1.0
+        place = before.places[m] + part * (now.places[m] - before.places[m])
+        kind, (robot, other) = self.kinds[m], self._find_members(m)
+        if kind == RUN_OVER:
+            other = int(now.others[m])
+        elif kind == OBSTACLE:
+            other = self._name_geom(int(self._tables.ids[now.others[m]]))
+        return Break(
+            *(kind, robot, other, float(before.time + part * step)),
+            *(tuple(place.tolist()), float(now.margins[m])),
+            speed=float(fall / step) if step > 0.0 else 0.0,
+        )
+
+    def _find_members(self, m: int) -> tuple[int | None, int | str | None]:
+        """Robot and other of a margin, as far as they are always the same."""
+        kind = self.kinds[m]
+        number = m - int(self._tables.starts[KINDS.index(kind)])
+        if kind == STRETCH:
+            return None, number
+        return self._pairs[number] if kind == COLLISION else (number, None)
+
+    def _name(self, m: int) -> str:
+        robot, other = self._find_members(m)
+        numbers = [str(n) for n in (robot, other) if n is not None]
+        return f"{self.kinds[m]} {'-'.join(numbers)}"
+
+    def _name_geom(self, geom: int) -> str:
+        model = self.world.model
+        body = model.body(model.geom_bodyid[geom]).name
+        return str(model.geom(geom).name) or f"geom {geom} of {body}"
+
+    def _make_limit_texts(self) -> dict[str, str]:
+        t, limits = self._tables, self.limits
+        return {
+            STRETCH: f"tension at most {t.tension:.4g} N",
+            RUN_OVER: f"hose's surface at least {limits.run_over_distance:g} m away",
+            COLLISION: f"robots at least {limits.collision_distance:g} m apart",
+            BOUNDS: f"at least {limits.bounds_distance:g} m inside the bounds",
+            OBSTACLE: f"obstacles at least {limits.obstacle_distance:g} m away",
+        }
+
+    def _make_probe(self, arcs: Array) -> HoseProbe | None:
+        """A probe for those geoms of robots that the kernels cannot measure, where there are."""
+        t = self._tables
+        own = slice(int(t.robot_rows[-1]))
+        strange = t.ids[own][t.rows[own, KIND] == kernels.OTHER_KIND]
+        return HoseProbe(self.world.model, strange, t.radius, arcs) if len(strange) else None

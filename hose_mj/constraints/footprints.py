@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import mujoco
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.geds.shapes import CAPSULE, CYLINDER, SPHERE
 from hose_mj.hoses.model import Array
 from hose_mj.world.world import World
 
@@ -18,8 +20,9 @@ TOUCH, TOUCH_RADII = 2e-3, 0.05
 """A robot stands on what is nearer than this (m), or than this part of its radius."""
 STEEPEST = 0.7
 """Cosine of the steepest ground that a robot stands on: 45 degrees."""
-_CYLINDER, _CAPSULE = mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE
-_BALLS = (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+_ROUNDING = 1e-9
+_ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+_CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,9 @@ def find_hose_bodies(world: World) -> NDArray[np.int64]:
     """Numbers of the bodies that a model of the hose added to the scene: their names are new."""
     model, scene = world.model, world.scene.make_spec().compile()
     names = {scene.body(b).name for b in range(scene.nbody)}
-    return np.array([b for b in range(1, model.nbody) if model.body(b).name not in names], dtype=int)
+    return np.array(
+        [b for b in range(1, model.nbody) if model.body(b).name not in names], dtype=int
+    )
 
 
 def find_obstacles(
@@ -109,10 +114,10 @@ def find_obstacles(
 def _find_reach(model: Any, data: Any, geom: int) -> float:
     """How far a geom reaches from its centre across the vertical (m), rather more than less."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
-    if kind in _BALLS:
-        return float(size[0] if kind == _BALLS[0] else size.max())
+    if kind in (SPHERE, _ELLIPSOID):
+        return float(size[0] if kind == SPHERE else size.max())
     rotation = data.geom_xmat[geom].reshape(3, 3)
-    if kind in (_CYLINDER, _CAPSULE):
+    if kind in (CYLINDER, CAPSULE):
         return float(size[0] + size[1] * np.hypot(rotation[0, 2], rotation[1, 2]))
     corners = model.geom_aabb[geom, :3] + model.geom_aabb[geom, 3:] * _CORNERS
     return float(np.max(np.linalg.norm((corners @ rotation.T)[:, :2], axis=1)))
@@ -121,7 +126,7 @@ def _find_reach(model: Any, data: Any, geom: int) -> float:
 def _is_upright(world: World, robot: int, geoms: NDArray[np.int64]) -> bool:
     """Whether a robot is one vertical cylinder that slides, and turns about the vertical alone."""
     model, data = world.model, world.data
-    if len(geoms) > 1 or model.geom_type[geoms[0]] != _CYLINDER:
+    if len(geoms) > 1 or model.geom_type[geoms[0]] != CYLINDER:
         return False
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, world.robot_bodies[robot]))
     slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
@@ -157,7 +162,3 @@ def _stands_on(world: World, footprint: Footprint, geom: int) -> bool:
     before = measure()
     data.geom_xpos[footprint.geoms, 2] += touch
     return before <= touch and measure() - before > STEEPEST * touch
-
-
-_CORNERS: Array = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-_ROUNDING = 1e-9

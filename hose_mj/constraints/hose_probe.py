@@ -8,7 +8,7 @@ piece's length squared times its curvature over 8.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,85 +20,104 @@ CHORDS = 4
 """In a piece of the centre line."""
 
 
+class Nearest(NamedTuple):
+    """Distance of the hose's surface, m; arc length of the chord's middle, m; its place (3,), m."""
+
+    distance: float
+    arc_length: float
+    place: Array
+
+
 class HoseProbe:
     """A small mjModel of the geoms in question and one capsule.
 
     Args:
         model: the world's.
-        geoms: numbers of the geoms.
+        geoms: for each robot the numbers of its geoms to be measured.
+        own: arc lengths between which a robot's own hose lies (N, 2), m.
         radius: of the hose, m.
         arcs: arc lengths at the ends of the centre line's pieces (K + 1,), m.
     """
 
-    def __init__(self, model: Any, geoms: Sequence[int], radius: float, arcs: Array) -> None:
-        self._geoms, self._radius = list(geoms), radius
-        steps = np.arange(CHORDS) / CHORDS
-        inner = arcs[:-1, None] + np.diff(arcs)[:, None] * steps
-        self._arcs = np.append(inner.ravel(), arcs[-1])
+    def __init__(
+        self, model: Any, geoms: Sequence[Sequence[int]], own: Array, radius: float, arcs: Array
+    ) -> None:
+        self._geoms, self._radius = geoms, radius
+        inner = arcs[:-1, None] + np.diff(arcs)[:, None] * (np.arange(CHORDS) / CHORDS)
+        self._arcs = np.unique([*inner.ravel(), arcs[-1], *np.clip(own.ravel(), 0.0, arcs[-1])])
+        self._middles = 0.5 * (self._arcs[:-1] + self._arcs[1:])
+        self._chords = [
+            np.flatnonzero((self._middles < low) | (self._middles > high)) for low, high in own
+        ]
+        self._copies: dict[int, int] = {}
         spec = mujoco.MjSpec()
-        for geom in self._geoms:
+        for geom in (geom for several in geoms for geom in several):
+            self._copies[geom] = len(self._copies)
             _copy_geom(spec, model, geom)
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, radius, 0.0])
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
 
-    def measure(
-        self, data: Any, geom: int, line: CentreLine, ends: tuple[float, float], most: float
-    ) -> tuple[float, float, Array]:
-        """Distance between a geom and the surface of a stretch of the hose.
+    def measure(self, data: Any, line: CentreLine, most: Array) -> list[Nearest | None]:
+        """For each robot the place where the hose's surface is nearest to the geoms in question.
 
         Args:
             data: the world's.
-            geom: its number in the world.
             line: the hose's centre line.
-            ends: arc lengths (m) of the stretch.
-            most: farther than this (m) is not looked for.
+            most: for each robot, farther than this (m) is not looked for.
 
         Returns:
-            distance (m), at most `most`; arc length (m); the middle of the nearest chord (3,), m.
+            None for a robot where nothing is nearer.
         """
-        own = self._place(data, geom)
-        inside = (self._arcs > ends[0]) & (self._arcs < ends[1])
-        arcs = np.concatenate([[ends[0]], self._arcs[inside], [ends[1]]])
-        points = line.position(arcs)
+        points = line.position(self._arcs)
         middles, along = 0.5 * (points[:-1] + points[1:]), np.diff(points, axis=0)
         lengths = np.linalg.norm(along, axis=1)
-        center, bound = self._data.geom_xpos[own], self._model.geom_rbound[own]
-        gaps = np.linalg.norm(middles - center, axis=1) - 0.5 * lengths - bound - self._radius
-        best, nearest = most, 0
-        for k in np.argsort(gaps):
-            if gaps[k] >= best:
-                break
-            self._lay(middles[k], along[k], lengths[k])
-            capsule = self._model.ngeom - 1
-            found = mujoco.mj_geomDistance(self._model, self._data, own, capsule, best, None)
-            if found < best:
-                best, nearest = found, int(k)
-        return best, float(0.5 * (arcs[nearest] + arcs[nearest + 1])), middles[nearest]
+        found: list[Nearest | None] = []
+        for i, geoms in enumerate(self._geoms):
+            best, nearest = float(most[i]), -1
+            for geom in geoms:
+                copy, chords = self._place(data, geom), self._chords[i]
+                apart = np.linalg.norm(middles[chords] - self._data.geom_xpos[copy], axis=1)
+                bound = self._model.geom_rbound[copy] + self._radius
+                gaps = apart - 0.5 * lengths[chords] - bound
+                for j in np.argsort(gaps):
+                    if gaps[j] >= best:
+                        break
+                    chord = int(chords[j])
+                    distance = self._lay(copy, middles[chord], along[chord], lengths[chord], best)
+                    if distance < best:
+                        best, nearest = distance, chord
+            near = nearest >= 0
+            arc = float(self._middles[nearest])
+            found.append(Nearest(best, arc, middles[nearest].copy()) if near else None)
+        return found
 
     def _place(self, data: Any, geom: int) -> int:
-        """Puts the copy of a geom where it is in the world; returns its number."""
-        own = self._geoms.index(geom)
+        """Puts the copy of a geom where it is in the world; returns the copy's number."""
+        copy = self._copies[geom]
         rotation = data.geom_xmat[geom].reshape(3, 3)
         turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, self._model.geom_quat[own])
-        self._data.geom_xpos[own] = data.geom_xpos[geom] + rotation @ self._model.geom_pos[own]
-        self._data.geom_xmat[own] = (rotation @ turn.reshape(3, 3)).ravel()
-        return own
+        mujoco.mju_quat2Mat(turn, self._model.geom_quat[copy])
+        self._data.geom_xpos[copy] = data.geom_xpos[geom] + rotation @ self._model.geom_pos[copy]
+        self._data.geom_xmat[copy] = (rotation @ turn.reshape(3, 3)).ravel()
+        return copy
 
-    def _lay(self, middle: Array, along: Array, length: float) -> None:
-        """Lays the capsule along a chord."""
+    def _lay(self, copy: int, middle: Array, along: Array, length: float, most: float) -> float:
+        """Lays the capsule along a chord; returns its distance from a copy, at most `most`."""
         quaternion, matrix = np.zeros(4), np.zeros(9)
         mujoco.mju_quatZ2Vec(quaternion, along)
         mujoco.mju_quat2Mat(matrix, quaternion)
         self._data.geom_xpos[-1], self._data.geom_xmat[-1] = middle, matrix
         self._model.geom_size[-1, 1] = 0.5 * length
+        capsule = self._model.ngeom - 1
+        return float(mujoco.mj_geomDistance(self._model, self._data, copy, capsule, most, None))
 
 
 def _copy_geom(spec: Any, model: Any, geom: int) -> None:
     """Adds a geom of the world's model; a mesh's own frame is found anew at compilation."""
-    if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
-        spec.worldbody.add_geom(type=model.geom_type[geom], size=model.geom_size[geom])
+    kind = mujoco.mjtGeom(model.geom_type[geom])
+    if kind != mujoco.mjtGeom.mjGEOM_MESH:
+        spec.worldbody.add_geom(type=kind, size=model.geom_size[geom])
         return
     mesh = model.geom_dataid[geom]
     points, faces = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
@@ -108,4 +127,4 @@ def _copy_geom(spec: Any, model: Any, geom: int) -> None:
         uservert=model.mesh_vert[points : points + model.mesh_vertnum[mesh]].ravel(),
         userface=model.mesh_face[faces : faces + model.mesh_facenum[mesh]].ravel(),
     )
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
+    spec.worldbody.add_geom(type=kind, meshname=name)

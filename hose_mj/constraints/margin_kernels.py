@@ -209,19 +209,25 @@ def _find_gap(rows, center, reach, g):  # type: ignore[no-untyped-def]
 
 @kernel
 def _queue_pairs(t, i, g, m, queued):  # type: ignore[no-untyped-def]
-    """Leaves robot i's geoms that are within sight of geom g to MuJoCo; returns how many are."""
+    """Leaves robot i's geoms that may be the nearest to geom g to MuJoCo; returns how many are.
+
+    The margin comes down to what it can be at most: the middle of a geom is within the geom.
+    """
+    clearance = t.clearances[1] if m < t.starts[3] else t.clearances[3]
     hull = (t.hulls[i, 0], t.hulls[i, 1], t.hulls[i, 2])
-    if _find_gap(t.rows, hull, t.hulls[i, 3], g) >= t.sight:
+    if _find_gap(t.rows, hull, t.hulls[i, 3], g) >= t.margins[m] + clearance:
         return queued
     for a in range(t.robot_rows[i], t.robot_rows[i + 1]):
         if m >= t.starts[4] and not t.obstacles[a, g]:
             continue
         center = (t.rows[a, POSITION], t.rows[a, POSITION + 1], t.rows[a, POSITION + 2])
         gap = _find_gap(t.rows, center, t.rows[a, BOUND], g)
-        if gap < t.sight:
+        if gap < t.margins[m] + clearance:
             t.near[queued, 0], t.near[queued, 1], t.near[queued, 2] = a, g, m
             t.gaps[queued] = gap
             queued += 1
+            if t.rows[g, KIND] != OTHER_KIND:
+                t.margins[m] = min(t.margins[m], gap + t.rows[a, BOUND] - clearance)
     return queued
 
 

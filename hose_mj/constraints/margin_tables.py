@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -140,5 +139,5 @@ def _make_rows(world: World, ids: NDArray[np.int64]) -> Array:
     kinds = model.geom_type[ids]
     rows[:, KIND] = np.where(np.isin(kinds, _SIMPLE), kinds, OTHER_KIND)
     rows[:, SIZE : SIZE + 3] = model.geom_size[ids]
-    rows[:, BOUND] = np.where(kinds == mujoco.mjtGeom.mjGEOM_PLANE, 0.0, model.geom_rbound[ids])
+    rows[:, BOUND] = np.where(kinds == PLANE, 0.0, model.geom_rbound[ids])
     return rows

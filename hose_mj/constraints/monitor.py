@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import mujoco
 import numpy as np
@@ -125,12 +125,12 @@ class Monitor:
     def _measure_pairs(self, queued: int) -> None:
         """Lets MuJoCo measure the pairs of geoms that may be nearer than what is known."""
         t, model, data = self._tables, self.world.model, self.world.data
-        ends = np.zeros(6)
-        for q in np.argsort(t.gaps[:queued]):
-            a, b, m = t.near[q]
+        ends, gaps = np.zeros(6), t.gaps[:queued]
+        for q in np.argsort(gaps).tolist():
+            a, b, m = t.near[q].tolist()
             clearance = t.clearances[1 if m < t.starts[3] else 3]
             most = t.margins[m] + clearance
-            if t.gaps[q] >= most:
+            if gaps[q] >= most:
                 continue
             found = mujoco.mj_geomDistance(model, data, t.ids[a], t.ids[b], most, ends)
             if found < most:
@@ -140,21 +140,14 @@ class Monitor:
 
     def _measure_probe(self, probe: HoseProbe, line: CentreLine) -> None:
         """Lets MuJoCo measure the hose's distance from geoms whose shape only it knows."""
-        t = self._tables
-        for i in range(self.world.n_robots):
-            m = int(t.starts[1]) + i
-            stretches = ((0.0, float(t.own[i, 0])), (float(t.own[i, 1]), line.arc_lengths[-1]))
-            for row in range(t.robot_rows[i], t.robot_rows[i + 1]):
-                for low, high in stretches:
-                    if t.rows[row, KIND] != kernels.OTHER_KIND or low >= high:
-                        continue
-                    most = t.margins[m] + t.clearances[0]
-                    distance, arc, place = probe.measure(
-                        self.world.data, int(t.ids[row]), line, (low, high), most
-                    )
-                    if distance < most:
-                        t.margins[m], t.places[m] = distance - t.clearances[0], place
-                        t.others[m] = int(np.sum(arc < t.segments[1:-1]))
+        t, clearance = self._tables, self.limits.run_over_distance
+        first, last = t.starts[1:3]
+        for i, near in enumerate(
+            probe.measure(self.world.data, line, t.margins[first:last] + clearance)
+        ):
+            if near is not None:
+                t.margins[first + i], t.places[first + i] = near.distance - clearance, near.place
+                t.others[first + i] = np.sum(near.arc_length < t.segments[1:-1])
 
     # -- what was found ----------------------------------------------------------------------------
 
@@ -204,6 +197,8 @@ class Monitor:
     def _make_probe(self, arcs: Array) -> HoseProbe | None:
         """A probe for those geoms of robots that the kernels cannot measure, where there are."""
         t = self._tables
-        own = slice(int(t.robot_rows[-1]))
-        strange = t.ids[own][t.rows[own, KIND] == kernels.OTHER_KIND]
-        return HoseProbe(self.world.model, strange, t.radius, arcs) if len(strange) else None
+        strange = [
+            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == kernels.OTHER_KIND]
+            for low, high in pairwise(t.robot_rows)
+        ]
+        return HoseProbe(self.world.model, strange, t.own, t.radius, arcs) if any(strange) else None

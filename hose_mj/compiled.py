@@ -45,7 +45,7 @@ def _read_fingerprint(folder: Path) -> str:
 
 
 def _find_fingerprint(function: Callable[..., Any]) -> str:
-    """What a function's machine code depends on: its own part of the package, and the part below it."""
+    """What a function's machine code depends on: its own part of the package, and one below."""
     parts = Path(function.__code__.co_filename).resolve().relative_to(_ROOT).parts
     folder = _ROOT.joinpath(*parts[: 1 if parts[0] == "learning" else 2])
     if folder == _ROOT / "hose_mj" / "hoses" or not folder.is_dir():

@@ -55,7 +55,7 @@ def find_footprint(world: World, robot: int) -> Footprint:
     collides |= np.isin(geoms, [*model.pair_geom1, *model.pair_geom2])
     geoms = geoms[collides] if collides.any() else geoms
     centers = data.geom_xpos[geoms, :2]
-    reaches = np.array([_find_reach(model, data, geom) for geom in geoms])
+    reaches = np.array([_find_reach(model, data, int(geom)) for geom in geoms])
     low, high = (centers - reaches[:, None]).min(axis=0), (centers + reaches[:, None]).max(axis=0)
     middle = 0.5 * (low + high)
     radius = float(np.max(np.linalg.norm(centers - middle, axis=1) + reaches))
@@ -100,7 +100,9 @@ def find_obstacles(
     others = np.flatnonzero(~np.isin(model.geom_bodyid, bodies) & ~np.isin(names, list(ground)))
     rows = []
     for footprint in footprints:
-        allowed = np.array([[_may_collide(model, a, b) for b in others] for a in footprint.geoms])
+        allowed = np.array(
+            [[_may_collide(model, int(a), int(b)) for b in others] for a in footprint.geoms]
+        )
         allowed = allowed.reshape(len(footprint.geoms), len(others))
         for column in np.flatnonzero(allowed.any(axis=0)):
             if _stands_on(world, footprint, int(others[column])):
@@ -155,9 +157,9 @@ def _stands_on(world: World, footprint: Footprint, geom: int) -> bool:
     touch = max(TOUCH, TOUCH_RADII * footprint.radius)
 
     def measure() -> float:
-        return min(
-            mujoco.mj_geomDistance(model, data, g, geom, 3.0 * touch, None) for g in footprint.geoms
-        )
+        most = 3.0 * touch
+        apart = [mujoco.mj_geomDistance(model, data, g, geom, most, None) for g in footprint.geoms]
+        return float(min(apart))
 
     before = measure()
     data.geom_xpos[footprint.geoms, 2] += touch

@@ -141,7 +141,8 @@ def find_nearest(rows, g, line, low, high, best):  # type: ignore[no-untyped-def
         rows: geoms, as in hoses/geds/shapes.py.
         g: the geom's row.
         line: arc lengths (K + 1,), coefficients (K, 4, 3) and balls (K, 5) of the pieces.
-        low, high: arc lengths, m.
+        low: arc length, m.
+        high: arc length, m.
         best: only distances below this are looked for, m.
 
     Returns:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +120,7 @@ def place_samples(arcs: Array, attachments: Array) -> tuple[Array, NDArray[np.in
     known = np.concatenate([arcs, 0.5 * (arcs[:-1] + arcs[1:])])
     inside = [
         np.array([low + _INSIDE * (high - low), high - _INSIDE * (high - low)])
-        for high, low in zip(attachments[:-1], attachments[1:], strict=True)
+        for high, low in pairwise(attachments)
     ]
     between = known[(known > attachments[-1]) & (known < attachments[0])]
     samples = np.sort(np.concatenate([*inside, between[~np.isin(between, attachments)]]))

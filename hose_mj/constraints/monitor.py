@@ -73,8 +73,10 @@ class Monitor:
         texts = self._make_limit_texts()
         self.limit_texts = tuple(texts[kind] for kind in self.kinds)
         self.breaks: tuple[Break, ...] = ()
+        self._pending: tuple[Break, ...] = ()
         with compile_notice("margins of constraints"):
-            self.reset()
+            self._last = self._measure()
+        self.reset()
 
     # -- measuring ---------------------------------------------------------------------------------
 

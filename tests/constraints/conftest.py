@@ -30,7 +30,7 @@ class FakeWorld(World):
         super().__init__(scene, scene.make_spec().compile())
         self.clock = 0.0
         length, start = scene.spec.length, np.array(scene.source.position)
-        self.line = make_straight(start, start + [0.0, 0.0, length], length)  # straight up
+        self.line = make_straight(start, start + length * np.eye(3)[2], length)  # straight up
         self.pull = lambda s: np.zeros(len(s))
         self._start_bodies()
 
@@ -139,7 +139,11 @@ def make_world(tmp_path):
     return make
 
 
-def make_rotation(rng):
-    quaternion, matrix = rng.normal(size=4), np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, quaternion / np.linalg.norm(quaternion))
-    return matrix.reshape(3, 3)
+@pytest.fixture(scope="session")
+def make_rotation():
+    def make(rng):
+        quaternion, matrix = rng.normal(size=4), np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, quaternion / np.linalg.norm(quaternion))
+        return matrix.reshape(3, 3)
+
+    return make

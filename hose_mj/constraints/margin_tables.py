@@ -45,8 +45,10 @@ def make_tables(
     counts = np.cumsum([0, *(len(footprint.geoms) for footprint in footprints)])
     kinds = [n, n, n * (n - 1) // 2, n * has_bounds(world), n * bool(len(geoms))]
     size = int(sum(kinds))
-    parts, part_ends = split_hose(arcs, world.arc_lengths)
-    samples, sample_segments = place_samples(arcs, world.arc_lengths)
+    # The tip's is L up to rounding.
+    attachments = np.clip(world.arc_lengths, arcs[0], arcs[-1])
+    parts, part_ends = split_hose(arcs, attachments)
+    samples, sample_segments = place_samples(arcs, attachments)
     own_arcs = np.array([limits.find_own_arc(footprint.radius) for footprint in footprints])
     may_meet = np.zeros((counts[-1], len(ids)), dtype=np.bool_)
     may_meet[:, counts[-1] :] = may_hit
@@ -66,8 +68,8 @@ def make_tables(
         ),
         bounds=np.array(world.scene.bounds),
         starts=np.cumsum([0, *kinds]),
-        segments=world.arc_lengths.copy(),
-        own=world.arc_lengths[:-1, None] + own_arcs[:, None] * [-1.0, 1.0],
+        segments=attachments,
+        own=attachments[:-1, None] + own_arcs[:, None] * [-1.0, 1.0],
         samples=samples,
         sample_segments=sample_segments,
         parts=parts,

@@ -11,16 +11,27 @@ from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.world import World
 
 
-def make_straight(start, end, length, pieces=8):
+def _make_straight(start, end, length, pieces=8):
     arcs = np.linspace(0.0, length, pieces + 1)
     points = np.linspace(start, end, pieces + 1)
     return CentreLine.of_chain(arcs, points)
 
 
-def make_curve(curve, slope, length, pieces=16):
-    """curve and slope: functions of arc lengths (k,), (k, 3) each."""
-    arcs = np.linspace(0.0, length, pieces + 1)
-    return CentreLine.of_spline(arcs, curve(arcs), slope(arcs))
+@pytest.fixture(scope="session")
+def make_straight():
+    """Makes a straight line: start, end, length."""
+    return _make_straight
+
+
+@pytest.fixture(scope="session")
+def make_curve():
+    """Makes a curve from functions of arc lengths (k,): position and slope, (k, 3) each."""
+
+    def make(curve, slope, length, pieces=16):
+        arcs = np.linspace(0.0, length, pieces + 1)
+        return CentreLine.of_spline(arcs, curve(arcs), slope(arcs))
+
+    return make
 
 
 class FakeWorld(World):
@@ -30,7 +41,7 @@ class FakeWorld(World):
         super().__init__(scene, scene.make_spec().compile())
         self.clock = 0.0
         length, start = scene.spec.length, np.array(scene.source.position)
-        self.line = make_straight(start, start + length * np.eye(3)[2], length)  # straight up
+        self.line = _make_straight(start, start + length * np.eye(3)[2], length)  # straight up
         self.pull = lambda s: np.zeros(len(s))
         self._start_bodies()
 

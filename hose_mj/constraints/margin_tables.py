@@ -36,10 +36,18 @@ def make_tables(
     limits: Limits,
     footprints: Sequence[Footprint],
     obstacles: tuple[NDArray[np.int64], NDArray[np.bool_]],
+    arcs: Array,
 ) -> Tables:
-    """Makes the tables; see `Tables`. `obstacles` as `find_obstacles` returns them."""
+    """Makes the tables; see `Tables`.
+
+    Args:
+        world: to be measured.
+        limits: what its margins are measured against.
+        footprints: of its robots.
+        obstacles: as `find_obstacles` returns them.
+        arcs: ends of the pieces of its centre line (K + 1,), m.
+    """
     n, spec = world.n_robots, world.scene.spec
-    arcs = world.centre_line().arc_lengths
     geoms, may_hit = obstacles
     ids = np.concatenate([*(footprint.geoms for footprint in footprints), geoms])
     counts = np.cumsum([0, *(len(footprint.geoms) for footprint in footprints)])

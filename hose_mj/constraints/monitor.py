@@ -62,10 +62,9 @@ class Monitor:
 
     def __init__(self, world: World, limits: Limits | None = None) -> None:
         self.world, self.limits = world, limits or Limits()
-        footprints = [find_footprint(world, i) for i in range(world.n_robots)]
-        obstacles = find_obstacles(world, footprints, self.limits.ground)
-        self._tables = make_tables(world, self.limits, footprints, obstacles)
-        self._probe = self._make_probe(world.centre_line().arc_lengths)
+        self._footprints = [find_footprint(world, i) for i in range(world.n_robots)]
+        self._obstacles = find_obstacles(world, self._footprints, self.limits.ground)
+        self._prepare(world.centre_line().arc_lengths)
         self._pairs = list(combinations(range(world.n_robots), 2))
         self.kinds = tuple(np.repeat(KINDS, np.diff(self._tables.starts)).tolist())
         self.names = tuple(self._name(m) for m in range(len(self.kinds)))
@@ -111,9 +110,18 @@ class Monitor:
         self.breaks = self._pending = tuple(found)
         return found[0] if found else None
 
+    def _prepare(self, arcs: Array) -> None:
+        """Makes the tables for a centre line with pieces between these arc lengths."""
+        self._arcs, world = arcs, self.world
+        self._tables = make_tables(world, self.limits, self._footprints, self._obstacles, arcs)
+        self._probe = self._make_probe(arcs)
+
     def _measure(self) -> _Measurement:
-        t, world = self._tables, self.world
+        world = self.world
         line = world.centre_line()
+        if not np.array_equal(line.arc_lengths, self._arcs):
+            self._prepare(line.arc_lengths)
+        t = self._tables
         queued = kernels.measure_margins(
             *(t, (line.arc_lengths, line.coefficients), world.tension(t.samples)),
             *(world.site_positions(), (world.data.geom_xpos, world.data.geom_xmat)),

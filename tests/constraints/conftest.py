@@ -95,6 +95,11 @@ def floors():
     return {n: read_scene(find_scene(f"floor_{n}")) for n in (1, 2, 3, 6)}
 
 
+@pytest.fixture(scope="session")
+def make_fake():
+    return FakeWorld
+
+
 @pytest.fixture
 def floor(floors):
     return FakeWorld(floors[2])
@@ -132,20 +137,22 @@ ROBOT = """<body name="robot{i}/body" pos="{at}">
 </body>"""
 
 
-@pytest.fixture
-def make_world(tmp_path):
+@pytest.fixture(scope="session")
+def make_world(tmp_path_factory):
     """Makes a world of robots with given geoms, one after the other along x at z = 0.5."""
-    count = iter(range(1000))
+    folder, scenes = tmp_path_factory.mktemp("scenes"), {}
 
     def make(*robots, others="", custom="", length=4.0, turn=""):
         bodies = [
             ROBOT.format(i=i, at=f"{2.0 - i} 0 0.5", geoms=geoms, turn=turn.format(i=i))
             for i, geoms in enumerate(robots)
         ]
-        path = tmp_path / f"scene{next(count)}.xml"
         text = SCENE.format(length=length, custom=custom, others=others, robots="\n".join(bodies))
-        path.write_text(text)
-        return FakeWorld(read_scene(path))
+        if text not in scenes:
+            path = folder / f"scene{len(scenes)}.xml"
+            path.write_text(text)
+            scenes[text] = read_scene(path)
+        return FakeWorld(scenes[text])
 
     return make
 

@@ -9,6 +9,7 @@ from hose_mj.hoses.spec import HoseSpec, check_number
 
 WEIGHTS = 2.0
 """A hose may always be pulled by so many times its own weight, see `Limits.find_tension`."""
+TOUCHING = 0.1
 OWN_RADII = 3.0
 SIGHT_RADII = 5.0
 
@@ -24,9 +25,10 @@ class Limits:
             whatever tension the model reports.
         own_arc: hose that never counts as run over, to either side of a robot's own attachment (m
             of arc); None for three times the robot's radius.
-        run_over_distance, collision_distance, bounds_distance, obstacle_distance: clearances (m)
-            below which robot and hose, two robots, a robot's site and the edge, a robot and an
-            obstacle count as met.
+        run_over_distance: robot and hose count as met when their surfaces are nearer (m); None for
+            a tenth of the hose's radius, because a hose that is pushed along may stay just clear.
+        collision_distance, bounds_distance, obstacle_distance: the same for two robots, a robot's
+            site and the edge, a robot and an obstacle (m).
         sight: farther than this (m) no distance between bodies is measured, and the margin is this
             less the clearance; None for five times the largest robot's radius.
         ground: names of geoms that robots may touch, beyond those they stand on.
@@ -39,7 +41,7 @@ class Limits:
     max_strain: float = 0.002
     max_lengthening: float = 0.1
     own_arc: float | None = None
-    run_over_distance: float = 0.0
+    run_over_distance: float | None = None
     collision_distance: float = 0.0
     bounds_distance: float = 0.0
     obstacle_distance: float = 0.0
@@ -50,12 +52,13 @@ class Limits:
         for name in ("max_tension", "sight"):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name))
-        if self.own_arc is not None:
-            check_number("own_arc", self.own_arc, may_be_zero=True)
-        check_number("max_strain", self.max_strain)
-        check_number("max_lengthening", self.max_lengthening)
-        for name in ("run_over", "collision", "bounds", "obstacle"):
-            check_number(f"{name}_distance", getattr(self, f"{name}_distance"), may_be_zero=True)
+        for name in ("own_arc", "run_over_distance"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), may_be_zero=True)
+        for name in ("max_strain", "max_lengthening"):
+            check_number(name, getattr(self, name))
+        for name in ("collision_distance", "bounds_distance", "obstacle_distance"):
+            check_number(name, getattr(self, name), may_be_zero=True)
         names = self.ground
         if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
             raise InputError("ground", names, "a tuple of names of geoms")
@@ -70,6 +73,14 @@ class Limits:
             return self.max_tension
         weight = spec.linear_density * spec.length * gravity
         return max(self.max_strain * spec.axial_stiffness, WEIGHTS * weight)
+
+    def find_clearances(self, radius: float) -> tuple[float, float, float, float]:
+        """Run-over, collision, bounds and obstacle distance (m) for a hose of a radius (m)."""
+        near = self.run_over_distance
+        return (
+            *(TOUCHING * radius if near is None else near, self.collision_distance),
+            *(self.bounds_distance, self.obstacle_distance),
+        )
 
     def find_own_arc(self, radius: float) -> float:
         """Hose to either side of an attachment that never counts for a robot of a radius (m)."""

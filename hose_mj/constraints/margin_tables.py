@@ -68,12 +68,7 @@ def make_tables(
         stiffness=spec.axial_stiffness,
         lengthening=limits.max_lengthening,
         sight=limits.find_sight(max(footprint.radius for footprint in footprints)),
-        clearances=np.array(
-            [
-                *(limits.run_over_distance, limits.collision_distance),
-                *(limits.bounds_distance, limits.obstacle_distance),
-            ]
-        ),
+        clearances=np.array(limits.find_clearances(spec.radius)),
         bounds=np.array(world.scene.bounds),
         starts=np.cumsum([0, *kinds]),
         segments=attachments,

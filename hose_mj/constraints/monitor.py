@@ -150,7 +150,7 @@ class Monitor:
 
     def _measure_probe(self, probe: HoseProbe, line: CentreLine) -> None:
         """Lets MuJoCo measure the hose's distance from geoms whose shape only it knows."""
-        t, clearance = self._tables, self.limits.run_over_distance
+        t, clearance = self._tables, self._tables.clearances[0]
         first, last = t.starts[1:3]
         for i, near in enumerate(
             probe.measure(self.world.data, line, t.margins[first:last] + clearance)
@@ -195,13 +195,13 @@ class Monitor:
         return str(model.geom(geom).name) or f"geom {geom} of {body}"
 
     def _make_limit_texts(self) -> dict[str, str]:
-        t, limits = self._tables, self.limits
+        near, apart, inside, clear = self._tables.clearances
         return {
-            STRETCH: f"tension at most {t.tension:.4g} N",
-            RUN_OVER: f"hose's surface at least {limits.run_over_distance:g} m away",
-            COLLISION: f"robots at least {limits.collision_distance:g} m apart",
-            BOUNDS: f"at least {limits.bounds_distance:g} m inside the bounds",
-            OBSTACLE: f"obstacles at least {limits.obstacle_distance:g} m away",
+            STRETCH: f"tension at most {self._tables.tension:.4g} N",
+            RUN_OVER: f"hose's surface at least {near:.3g} m away",
+            COLLISION: f"robots at least {apart:.3g} m apart",
+            BOUNDS: f"at least {inside:.3g} m inside the bounds",
+            OBSTACLE: f"obstacles at least {clear:.3g} m away",
         }
 
     def _make_probe(self, arcs: Array) -> HoseProbe | None:

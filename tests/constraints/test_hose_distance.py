@@ -32,7 +32,7 @@ def make_row(kind, size, position, rotation):
 def make_line(rng, roughness):
     """A smooth wandering curve of 12 pieces of uneven length; large roughness makes knots of it."""
     arcs = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 12))])
-    heading = np.cumsum(roughness * rng.normal(size=(13, 3)), axis=0) + [1.0, 0.0, 0.0]
+    heading = np.eye(3)[0] + np.cumsum(roughness * rng.normal(size=(13, 3)), axis=0)
     heading /= np.linalg.norm(heading, axis=1, keepdims=True)
     points = np.cumsum(np.diff(arcs, prepend=0.0)[:, None] * heading, axis=0)
     spline = CubicSpline(arcs, points)

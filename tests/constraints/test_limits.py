@@ -52,6 +52,12 @@ def test_lengths_follow_the_robot(floor):
     assert Limits(own_arc=0.3, sight=2.0).find_sight(0.02) == 2.0
 
 
+def test_a_hose_counts_as_met_when_it_is_all_but_touched():
+    assert Limits().find_clearances(0.008) == pytest.approx((0.0008, 0.0, 0.0, 0.0))
+    given = Limits(run_over_distance=0.0, bounds_distance=0.02)
+    assert given.find_clearances(0.008) == (0.0, 0.0, 0.02, 0.0)
+
+
 def test_ground_that_is_not_there_is_refused(floor):
     with pytest.raises(InputError, match="'flor'"):
         Monitor(floor, Limits(ground=("flor",)))

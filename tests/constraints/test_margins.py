@@ -11,7 +11,7 @@ from hose_mj.constraints.monitor import Monitor
 from hose_mj.world.centre_line import CentreLine
 
 HOSE = 0.01
-FAR = Limits(sight=10.0, own_arc=0.5)
+FAR = Limits(sight=10.0, own_arc=0.5, run_over_distance=0.0)
 GEOMS = {
     "sphere": '<geom type="sphere" size=".1"/>',
     "capsule": '<geom type="capsule" size=".05 .1"/>',
@@ -69,7 +69,7 @@ def test_what_robots_hold_themselves_does_not_count(make_world):
     lay_over(world, 0.0)  # robot 0 at the tip, x = 2; robot 1 holds arc 2 m, which is at x = 0
     for own in (0.3, 0.5):
         world.put(1, (0.0, 0.0))
-        monitor = Monitor(world, Limits(sight=10.0, own_arc=own))
+        monitor = Monitor(world, Limits(sight=10.0, own_arc=own, run_over_distance=0.0))
         assert get(monitor, "run-over 0") == pytest.approx(own - 0.1 - HOSE)
         assert get(monitor, "run-over 1") == pytest.approx(own - 0.1 - HOSE)
     # Both sides are left out, and nothing else: robot 0 at x = 0 runs over robot 1's hose.

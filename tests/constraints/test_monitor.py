@@ -11,8 +11,8 @@ from hose_mj.constraints.breaks import KINDS
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.monitor import Monitor
 
-DISC, HOSE = 0.02, 0.008
-"""Radii of the floor's pucks and hose (m)."""
+DISC, HOSE, NEAR = 0.02, 0.008, 0.0008
+"""Radii of the floor's pucks and hose (m), and how near the hose counts as run over."""
 
 
 def advance(world, monitor, move, steps):
@@ -83,7 +83,7 @@ def test_a_puck_runs_over_the_hose_of_another(floor, make_straight):
     monitor = Monitor(floor)
     found = advance(floor, monitor, lambda t: floor.put(0, (0.3 - 0.05 * t, 0.3 - 0.1 * t)), 400)
     assert (found.kind, found.robot, found.other) == ("run-over", 0, 1)
-    assert found.time == pytest.approx((0.3 - DISC - HOSE) / 0.1, abs=1e-9)
+    assert found.time == pytest.approx((0.3 - DISC - HOSE - NEAR) / 0.1, abs=1e-9)
     assert found.speed == pytest.approx(0.1, abs=1e-9)
     assert found.place == pytest.approx((0.3 - 0.05 * found.time, 0.0, 0.008), abs=1e-6)
 
@@ -176,7 +176,8 @@ def test_a_break_says_and_records_itself(floor):
 @pytest.mark.parametrize("kind", ["run_over", "collision", "bounds"])
 def test_a_clearance_shifts_its_margin_alone(floor, make_straight, kind):
     floor.line = make_straight((0, 0, 0.008), (0.8, 0, 0.008), 0.8)
-    plain, wide = Monitor(floor), Monitor(floor, Limits(**{f"{kind}_distance": 0.007}))
+    plain = Monitor(floor, Limits(run_over_distance=0.0))
+    wide = Monitor(floor, Limits(**{"run_over_distance": 0.0, f"{kind}_distance": 0.007}))
     shift = plain.measure() - wide.measure()
     wanted = [0.007 if k.replace("-", "_") == kind else 0.0 for k in plain.kinds]
     assert shift == pytest.approx(wanted, abs=1e-15)

@@ -1,11 +1,11 @@
-"""All margins of a world in one compiled call, but for pairs of geoms that are left to MuJoCo."""
+"""All margins of a world in one compiled call, but for pairs of geoms that are left to MuJoCo.
+
+`t` is everywhere the `Tables` of margin_tables.py.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from hose_mj.compiled import kernel
 from hose_mj.constraints.hose_distance import (
@@ -17,73 +17,10 @@ from hose_mj.constraints.hose_distance import (
 )
 from hose_mj.hoses.geds.shapes import BOUND, KIND, POSITION, ROTATION, SIZE, measure
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 OTHER_KIND = -1.0
 """In a row of hoses/geds/shapes.py: a geom of which only the bounding ball counts here."""
 _GAUSS = ((0.5 - np.sqrt(0.15), 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + np.sqrt(0.15), 5.0 / 18.0))
 """Places in [0, 1] and weights of three-point Gauss quadrature."""
-
-
-class Tables(NamedTuple):
-    """What does not change while a monitor watches, and room to work in.
-
-    Attributes:
-        radius: of the hose, m.
-        tension: that breaks a segment, N.
-        stiffness: the hose's axial stiffness, N.
-        lengthening: that breaks a segment, as a fraction.
-        sight: distances are measured up to this, m.
-        clearances: run-over, collision, bounds, obstacle (4,), m.
-        bounds: low and high corner (2, 3), m.
-        starts: of the margins: stretch, run-over, collision, bounds, obstacle, end (6,).
-        segments: arc lengths of the attachments from the source's, (N + 1,), m.
-        own: arc lengths between which a robot's own hose lies (N, 2), m.
-        samples: arc lengths where tension is known (T,), m.
-        sample_segments: the segment of each (T,).
-        parts: parts of the hose within one piece and one segment: piece, segment (P, 2).
-        part_ends: where they begin and end within the piece (P, 2).
-        rows: geoms of robots and obstacles, as in hoses/geds/shapes.py (G, ROW).
-        ids: their numbers in the mjModel (G,).
-        robot_rows: robot i has the rows from its entry to the next one's (N + 1,).
-        upright: whether a robot is one cylinder that stays upright (N,).
-        obstacles: whether a robot's geom may hit a geom (R, G).
-        balls: of the hose's pieces (K, 5).
-        hulls: centre and radius of a ball about each robot (N, 4), m.
-        near: pairs of geoms left to MuJoCo: rows and margin (Q, 3).
-        gaps: below which no pair's distance can lie (Q,), m.
-        margins: (M,).
-        places: (M, 3), m.
-        others: segment or row that a margin is about, -1 for none (M,).
-    """
-
-    radius: float
-    tension: float
-    stiffness: float
-    lengthening: float
-    sight: float
-    clearances: Floats
-    bounds: Floats
-    starts: Ints
-    segments: Floats
-    own: Floats
-    samples: Floats
-    sample_segments: Ints
-    parts: Ints
-    part_ends: Floats
-    rows: Floats
-    ids: Ints
-    robot_rows: Ints
-    upright: NDArray[np.bool_]
-    obstacles: NDArray[np.bool_]
-    balls: Floats
-    hulls: Floats
-    near: Ints
-    gaps: Floats
-    margins: Floats
-    places: Floats
-    others: Ints
 
 
 @kernel
@@ -270,7 +207,7 @@ def measure_margins(t, line, tensions, sites, poses):  # type: ignore[no-untyped
     """Writes all margins with their places.
 
     Args:
-        t: Tables; `rows` and everything after `obstacles` in it is written.
+        t: Tables (margin_tables.py); `rows` and everything after `obstacles` in it is written.
         line: arc lengths (K + 1,), m, and coefficients (K, 4, 3), m, of the centre line.
         tensions: at `samples` (T,), N.
         sites: where robots and source hold the hose (N + 1, 3), m.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from hose_mj.constraints.footprints import Footprint
 from hose_mj.constraints.hose_distance import BALL
 from hose_mj.constraints.limits import Limits
-from hose_mj.constraints.margin_kernels import OTHER_KIND, Tables
+from hose_mj.constraints.margin_kernels import OTHER_KIND
 from hose_mj.hoses.geds.shapes import (
     BOUND,
     BOX,
@@ -26,16 +27,78 @@ from hose_mj.hoses.geds.shapes import (
 from hose_mj.hoses.model import Array
 from hose_mj.world.world import World
 
+Ints = NDArray[np.int64]
+
 _SIMPLE = (PLANE, SPHERE, CAPSULE, CYLINDER, BOX)
 _INSIDE = 1e-9
 """Tension is sampled this part of a segment's length inside its ends, where it may jump."""
+
+
+class Tables(NamedTuple):
+    """What does not change while a monitor watches, and room to work in.
+
+    Attributes:
+        radius: of the hose, m.
+        tension: that breaks a segment, N.
+        stiffness: the hose's axial stiffness, N.
+        lengthening: that breaks a segment, as a fraction.
+        sight: distances are measured up to this, m.
+        clearances: run-over, collision, bounds, obstacle (4,), m.
+        bounds: low and high corner (2, 3), m.
+        starts: of the margins: stretch, run-over, collision, bounds, obstacle, end (6,).
+        segments: arc lengths of the attachments from the source's, (N + 1,), m.
+        own: arc lengths between which a robot's own hose lies (N, 2), m.
+        samples: arc lengths where tension is known (T,), m.
+        sample_segments: the segment of each (T,).
+        parts: parts of the hose within one piece and one segment: piece, segment (P, 2).
+        part_ends: where they begin and end within the piece (P, 2).
+        rows: geoms of robots and obstacles, as in hoses/geds/shapes.py (G, ROW).
+        ids: their numbers in the mjModel (G,).
+        robot_rows: robot i has the rows from its entry to the next one's (N + 1,).
+        upright: whether a robot is one cylinder that stays upright (N,).
+        obstacles: whether a robot's geom may hit a geom (R, G).
+        balls: of the hose's pieces (K, 5).
+        hulls: centre and radius of a ball about each robot (N, 4), m.
+        near: pairs of geoms left to MuJoCo: rows and margin (Q, 3).
+        gaps: below which no pair's distance can lie (Q,), m.
+        margins: (M,).
+        places: (M, 3), m.
+        others: segment or row that a margin is about, -1 for none (M,).
+    """
+
+    radius: float
+    tension: float
+    stiffness: float
+    lengthening: float
+    sight: float
+    clearances: Array
+    bounds: Array
+    starts: Ints
+    segments: Array
+    own: Array
+    samples: Array
+    sample_segments: Ints
+    parts: Ints
+    part_ends: Array
+    rows: Array
+    ids: Ints
+    robot_rows: Ints
+    upright: NDArray[np.bool_]
+    obstacles: NDArray[np.bool_]
+    balls: Array
+    hulls: Array
+    near: Ints
+    gaps: Array
+    margins: Array
+    places: Array
+    others: Ints
 
 
 def make_tables(
     world: World,
     limits: Limits,
     footprints: Sequence[Footprint],
-    obstacles: tuple[NDArray[np.int64], NDArray[np.bool_]],
+    obstacles: tuple[Ints, NDArray[np.bool_]],
     arcs: Array,
 ) -> Tables:
     """Makes the tables; see `Tables`.
@@ -97,7 +160,7 @@ def has_bounds(world: World) -> bool:
     return bool(np.any(np.isfinite(world.scene.bounds)))
 
 
-def split_hose(arcs: Array, attachments: Array) -> tuple[NDArray[np.int64], Array]:
+def split_hose(arcs: Array, attachments: Array) -> tuple[Ints, Array]:
     """Cuts the hose at the ends of pieces and at the attachments.
 
     Args:
@@ -116,7 +179,7 @@ def split_hose(arcs: Array, attachments: Array) -> tuple[NDArray[np.int64], Arra
     return parts.astype(np.int64), ends / np.diff(arcs)[pieces, None]
 
 
-def place_samples(arcs: Array, attachments: Array) -> tuple[Array, NDArray[np.int64]]:
+def place_samples(arcs: Array, attachments: Array) -> tuple[Array, Ints]:
     """Arc lengths between which every model's tension is a straight line, and their segments.
 
     Tension is known at the joints of a cable, the middles of a flex's edges and of a spline's
@@ -132,13 +195,13 @@ def place_samples(arcs: Array, attachments: Array) -> tuple[Array, NDArray[np.in
     return samples, _find_segments(samples, attachments)
 
 
-def _find_segments(places: Array, attachments: Array) -> NDArray[np.int64]:
+def _find_segments(places: Array, attachments: Array) -> Ints:
     """The segment of each arc length: segment i ends at attachment i."""
     found = len(attachments) - 1 - np.searchsorted(attachments[::-1], places)
     return np.asarray(found, dtype=np.int64)
 
 
-def _make_rows(world: World, ids: NDArray[np.int64]) -> Array:
+def _make_rows(world: World, ids: Ints) -> Array:
     """Rows of geoms (G, ROW), without their poses."""
     model = world.model
     rows = np.zeros((len(ids), ROW))

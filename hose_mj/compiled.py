@@ -29,6 +29,8 @@ _OPTIONS: dict[str, Any] = {
 }
 _INLINED: Any = {"error_model": "numpy", "forceinline": True}
 _ROOT = Path(__file__).resolve().parent.parent
+_BELOW = {"constraints": "hoses"}
+"""The other part of the package whose kernels a part's own inline, where it is not the tasks."""
 
 
 @cache
@@ -43,12 +45,13 @@ def _read_fingerprint(folder: Path) -> str:
 
 
 def _find_fingerprint(function: Callable[..., Any]) -> str:
-    """What a function's machine code depends on: its own part of the package, and the tasks."""
+    """What a function's machine code depends on: its own part of the package, and one below."""
     parts = Path(function.__code__.co_filename).resolve().relative_to(_ROOT).parts
     folder = _ROOT.joinpath(*parts[: 1 if parts[0] == "learning" else 2])
     if folder == _ROOT / "hose_mj" / "hoses" or not folder.is_dir():
         return _read_fingerprint(folder)
-    return _read_fingerprint(folder) + _read_fingerprint(_ROOT / "hose_mj" / "tasks")
+    below = _BELOW.get(folder.name, "tasks") if parts[0] == "hose_mj" else "tasks"
+    return _read_fingerprint(folder) + _read_fingerprint(_ROOT / "hose_mj" / below)
 
 
 def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:

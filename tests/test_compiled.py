@@ -1,11 +1,13 @@
 import subprocess
 import sys
 
+import pytest
+
 from hose_mj import compiled
 
 LOWER = "from hose_mj.compiled import kernel\n\n@kernel\ndef lower(x):\n    return x + {}\n"
 UPPER = """from hose_mj.compiled import kernel
-from hose_mj.part.lower import lower
+from hose_mj.{}.lower import lower
 
 @kernel
 def upper(x):
@@ -13,19 +15,20 @@ def upper(x):
 """
 
 
-def test_a_change_in_an_inlined_kernel_of_another_file_is_noticed(tmp_path):
+@pytest.mark.parametrize(("below", "above"), [("part", "part"), ("hoses", "constraints")])
+def test_a_change_in_an_inlined_kernel_of_another_file_is_noticed(tmp_path, below, above):
     # A copy of compiled.py in a package of its own, so that its root is this folder.
     package = tmp_path / "hose_mj"
-    for folder in (package, package / "part", package / "tasks"):
-        folder.mkdir()
+    for folder in (package, package / below, package / above, package / "tasks"):
+        folder.mkdir(exist_ok=True)
         (folder / "__init__.py").touch()
     source = (compiled._ROOT / "hose_mj" / "compiled.py").read_text(encoding="utf-8")
     (package / "compiled.py").write_text(source, encoding="utf-8")
-    (package / "part" / "upper.py").write_text(UPPER, encoding="utf-8")
-    program = "from hose_mj.part.upper import upper; print(upper(1.0), upper.stats.cache_hits)"
+    (package / above / "upper.py").write_text(UPPER.format(below), encoding="utf-8")
+    program = f"from hose_mj.{above}.upper import upper; print(upper(1.0), upper.stats.cache_hits)"
     said = []
     for number in (1, 1, 2, 1):
-        (package / "part" / "lower.py").write_text(LOWER.format(number), encoding="utf-8")
+        (package / below / "lower.py").write_text(LOWER.format(number), encoding="utf-8")
         command = [sys.executable, "-c", program]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
         said.append(done.stdout.split(" ", 1))

@@ -33,8 +33,8 @@ FLOORS = {
         "hose_mj.scenes",
     },
     "hose_mj.constraints": {
-        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.scenes"),
-        "hose_mj.world",
+        *("hose_mj.errors", "hose_mj.compiled", "hose_mj.hoses", "hose_mj.hoses.spec"),
+        *("hose_mj.scenes", "hose_mj.world"),
     },
     "hose_mj.rollout": {
         *("hose_mj.errors", "hose_mj.hoses", "hose_mj.scenes", "hose_mj.world"),

@@ -1,0 +1,166 @@
+"""`Footprint`: a robot as the set of its colliding geoms; `find_obstacles`: what it may hit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds.shapes import CAPSULE, CYLINDER, SPHERE
+from hose_mj.hoses.model import Array
+from hose_mj.world.world import World
+
+TOUCH, TOUCH_RADII = 2e-3, 0.05
+"""A robot stands on what is nearer than this (m), or than this part of its radius."""
+STEEPEST = 0.7
+"""Cosine of the steepest ground that a robot stands on: 45 degrees."""
+_ROUNDING = 1e-9
+_ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+_CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """What of a robot must not meet hose, robots and obstacles.
+
+    Attributes:
+        geoms: numbers of its colliding geoms; all of its geoms where none collides.
+        radius: of an upright cylinder around them, about the middle of their bounding box (m).
+        upright: whether it is a single cylinder whose axis is and stays vertical: a puck.
+    """
+
+    geoms: NDArray[np.int64]
+    radius: float
+    upright: bool
+
+
+def find_footprint(world: World, robot: int) -> Footprint:
+    """Returns the footprint of a robot as the world stands.
+
+    Raises:
+        InputError: a robot without geoms.
+    """
+    model, data = world.model, world.data
+    geoms = np.flatnonzero(np.isin(model.geom_bodyid, world.robot_bodies[robot]))
+    if len(geoms) == 0:
+        name = world.scene.robots[robot].name
+        raise InputError(f"geoms of {name}", 0, "at least one, to know where the robot ends")
+    collides = (model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0
+    collides |= np.isin(geoms, [*model.pair_geom1, *model.pair_geom2])
+    geoms = geoms[collides] if collides.any() else geoms
+    centers = data.geom_xpos[geoms, :2]
+    reaches = np.array([_find_reach(model, data, int(geom)) for geom in geoms])
+    low, high = (centers - reaches[:, None]).min(axis=0), (centers + reaches[:, None]).max(axis=0)
+    middle = 0.5 * (low + high)
+    radius = float(np.max(np.linalg.norm(centers - middle, axis=1) + reaches))
+    return Footprint(geoms, radius, _is_upright(world, robot, geoms))
+
+
+def find_hose_bodies(world: World) -> NDArray[np.int64]:
+    """Numbers of the bodies that a model of the hose added to the scene: their names are new."""
+    model, scene = world.model, world.scene.make_spec().compile()
+    names = {scene.body(b).name for b in range(scene.nbody)}
+    return np.array(
+        [b for b in range(1, model.nbody) if model.body(b).name not in names], dtype=int
+    )
+
+
+def find_obstacles(
+    world: World, footprints: Sequence[Footprint], ground: Sequence[str]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Returns the geoms that robots may hit, and which geom of a robot may hit which of them.
+
+    A robot's geom may hit what MuJoCo lets it collide with: by their bits, or by an explicit pair,
+    unless their bodies are excluded. What is no obstacle: other robots, the hose, what the robot
+    stands on (`_stands_on`), and the geoms named in `ground`.
+
+    Args:
+        world: as it stands when robots are on their ground.
+        footprints: the robots'.
+        ground: names of geoms.
+
+    Returns:
+        geoms (H,), and a matrix (R, H) for the footprints' geoms, one robot after the other.
+
+    Raises:
+        InputError: a name in `ground` that no geom has.
+    """
+    model = world.model
+    names = [model.geom(g).name for g in range(model.ngeom)]
+    for name in ground:
+        if name not in names:
+            raise InputError("ground", name, "names of the scene's geoms")
+    bodies = np.concatenate([*world.robot_bodies, find_hose_bodies(world)])
+    others = np.flatnonzero(~np.isin(model.geom_bodyid, bodies) & ~np.isin(names, list(ground)))
+    rows = []
+    for footprint in footprints:
+        allowed = np.array(
+            [[_may_collide(model, int(a), int(b)) for b in others] for a in footprint.geoms]
+        )
+        allowed = allowed.reshape(len(footprint.geoms), len(others))
+        for column in np.flatnonzero(allowed.any(axis=0)):
+            if _stands_on(world, footprint, int(others[column])):
+                allowed[:, column] = False
+        rows.append(allowed)
+    matrix = np.concatenate(rows)
+    met = matrix.any(axis=0)
+    return others[met], matrix[:, met]
+
+
+def _find_reach(model: Any, data: Any, geom: int) -> float:
+    """How far a geom reaches from its centre across the vertical (m), rather more than less."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    if kind in (SPHERE, _ELLIPSOID):
+        return float(size[0] if kind == SPHERE else size.max())
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    if kind in (CYLINDER, CAPSULE):
+        return float(size[0] + size[1] * np.hypot(rotation[0, 2], rotation[1, 2]))
+    corners = model.geom_aabb[geom, :3] + model.geom_aabb[geom, 3:] * _CORNERS
+    return float(np.max(np.linalg.norm((corners @ rotation.T)[:, :2], axis=1)))
+
+
+def _is_upright(world: World, robot: int, geoms: NDArray[np.int64]) -> bool:
+    """Whether a robot is one vertical cylinder that slides, and turns about the vertical alone."""
+    model, data = world.model, world.data
+    if len(geoms) > 1 or model.geom_type[geoms[0]] != CYLINDER:
+        return False
+    joints = np.flatnonzero(np.isin(model.jnt_bodyid, world.robot_bodies[robot]))
+    slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+    hinges = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE
+    vertical = np.abs(data.xaxis[joints, 2]) > 1.0 - _ROUNDING
+    stands = abs(data.geom_xmat[geoms[0], 8]) > 1.0 - _ROUNDING
+    return bool(stands and np.all(slides | (hinges & vertical)))
+
+
+def _may_collide(model: Any, a: int, b: int) -> bool:
+    """MuJoCo's rule for two geoms of bodies that are not joined."""
+    pairs = {(int(g), int(h)) for g, h in zip(model.pair_geom1, model.pair_geom2, strict=True)}
+    if (a, b) in pairs or (b, a) in pairs:
+        return True
+    low, high = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
+    if (low << 16) + high in model.exclude_signature:
+        return False
+    bits, own = model.geom_contype, model.geom_conaffinity
+    return bool((bits[a] & own[b]) | (bits[b] & own[a]))
+
+
+def _stands_on(world: World, footprint: Footprint, geom: int) -> bool:
+    """Whether a robot touches a geom, or nearly, and would leave it if it were lifted."""
+    model, data = world.model, mujoco.MjData(world.model)
+    data.geom_xpos[:], data.geom_xmat[:] = world.data.geom_xpos, world.data.geom_xmat
+    touch = max(TOUCH, TOUCH_RADII * footprint.radius)
+
+    def measure() -> float:
+        most = 3.0 * touch
+        apart = [mujoco.mj_geomDistance(model, data, g, geom, most, None) for g in footprint.geoms]
+        return float(min(apart))
+
+    before = measure()
+    data.geom_xpos[footprint.geoms, 2] += touch
+    return before <= touch and measure() - before > STEEPEST * touch

@@ -1,0 +1,225 @@
+"""All margins of a world in one compiled call, but for pairs of geoms that are left to MuJoCo.
+
+`t` is everywhere the `Tables` of margin_tables.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hose_mj.compiled import kernel
+from hose_mj.constraints.hose_distance import (
+    find_nearest,
+    find_point,
+    find_slope,
+    locate,
+    update_balls,
+)
+from hose_mj.hoses.geds.shapes import BOUND, KIND, POSITION, ROTATION, SIZE, measure
+
+OTHER_KIND = -1.0
+"""In a row of hoses/geds/shapes.py: a geom of which only the bounding ball counts here."""
+_GAUSS = ((0.5 - np.sqrt(0.15), 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + np.sqrt(0.15), 5.0 / 18.0))
+"""Places in [0, 1] and weights of three-point Gauss quadrature."""
+
+
+@kernel
+def _put(t, m, margin, place, other):  # type: ignore[no-untyped-def]
+    """Writes margin m."""
+    t.margins[m] = margin
+    t.others[m] = other
+    for c in range(3):
+        t.places[m, c] = place[c]
+
+
+@kernel
+def _place_geoms(t, positions, rotations):  # type: ignore[no-untyped-def]
+    """Copies geom_xpos and geom_xmat into the rows, and lays a ball about each robot."""
+    for g in range(t.ids.shape[0]):
+        for c in range(3):
+            t.rows[g, POSITION + c] = positions[t.ids[g], c]
+        for c in range(9):
+            t.rows[g, ROTATION + c] = rotations[t.ids[g], c]
+    for i in range(t.hulls.shape[0]):
+        first, last = t.robot_rows[i], t.robot_rows[i + 1]
+        for c in range(3):
+            total = 0.0
+            for g in range(first, last):
+                total += t.rows[g, POSITION + c]
+            t.hulls[i, c] = total / (last - first)
+        t.hulls[i, 3] = 0.0
+        for g in range(first, last):
+            square = 0.0
+            for c in range(3):
+                square += (t.rows[g, POSITION + c] - t.hulls[i, c]) ** 2
+            t.hulls[i, 3] = max(t.hulls[i, 3], np.sqrt(square) + t.rows[g, BOUND])
+
+
+@kernel
+def _measure_stretch(t, arcs, coefficients, tensions):  # type: ignore[no-untyped-def]
+    """Per segment: by its largest tension, and by its length, as a tension by Hooke's law.
+
+    While a segment is looked at, its margin holds its length.
+    """
+    n = t.segments.shape[0] - 1
+    for i in range(n):
+        t.margins[i] = 0.0
+        t.others[i] = -1
+    for p in range(t.parts.shape[0]):
+        k = t.parts[p, 0]
+        low, width = t.part_ends[p, 0], t.part_ends[p, 1] - t.part_ends[p, 0]
+        for place, weight in _GAUSS:
+            d = find_slope(coefficients, k, low + place * width)
+            length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+            t.margins[t.parts[p, 1]] += weight * width * length
+    for j in range(tensions.shape[0]):
+        i = t.sample_segments[j]
+        if t.others[i] < 0 or tensions[j] > tensions[t.others[i]]:
+            t.others[i] = j
+    for i in range(n):
+        peak = t.others[i]
+        strain = t.margins[i] / (t.segments[i] - t.segments[i + 1]) - 1.0
+        k, u = locate(arcs, t.samples[peak])
+        margin = min(t.tension - tensions[peak], t.stiffness * (t.lengthening - strain))
+        _put(t, i, margin, find_point(coefficients, k, u), i)
+
+
+@kernel
+def _measure_run_over(t, arcs, coefficients):  # type: ignore[no-untyped-def]
+    """Per robot: how far its geoms are from the hose's surface, its own hose left out."""
+    n = t.own.shape[0]
+    line = (arcs, coefficients, t.balls)
+    for i in range(n):
+        best, piece, at = t.sight + t.radius, -1, 0.0
+        for g in range(t.robot_rows[i], t.robot_rows[i + 1]):
+            if t.rows[g, KIND] == OTHER_KIND:
+                continue
+            for low, high in ((arcs[0], t.own[i, 0]), (t.own[i, 1], arcs[-1])):
+                best, k, u = find_nearest(t.rows, g, line, low, high, best)
+                if k >= 0:
+                    piece, at = k, u
+        margin = best - t.radius - t.clearances[0]
+        if piece < 0:
+            _put(t, t.starts[1] + i, margin, t.hulls[i], -1)
+            continue
+        arc = arcs[piece] + at * (arcs[piece + 1] - arcs[piece])
+        segment = 0
+        while segment < n - 1 and arc < t.segments[segment + 1]:
+            segment += 1
+        _put(t, t.starts[1] + i, margin, find_point(coefficients, piece, at), segment)
+
+
+@kernel
+def _measure_discs(t, i, j, m):  # type: ignore[no-untyped-def]
+    """Two upright cylinders: across, above one another, or from rim to rim."""
+    a, b = t.robot_rows[i], t.robot_rows[j]
+    d0 = t.rows[b, POSITION] - t.rows[a, POSITION]
+    d1 = t.rows[b, POSITION + 1] - t.rows[a, POSITION + 1]
+    d2 = t.rows[b, POSITION + 2] - t.rows[a, POSITION + 2]
+    apart = np.sqrt(d0 * d0 + d1 * d1)
+    across = apart - t.rows[a, SIZE] - t.rows[b, SIZE]
+    above = abs(d2) - t.rows[a, SIZE + 1] - t.rows[b, SIZE + 1]
+    if across > 0.0 and above > 0.0:
+        distance = np.sqrt(across * across + above * above)
+    else:
+        distance = max(across, above)
+    part = (t.rows[a, SIZE] + 0.5 * across) / max(apart, 1e-12)
+    place = (
+        t.rows[a, POSITION] + part * d0,
+        t.rows[a, POSITION + 1] + part * d1,
+        t.rows[a, POSITION + 2] + 0.5 * d2,
+    )
+    _put(t, m, min(distance, t.sight) - t.clearances[1], place, j)
+
+
+@kernel
+def _find_gap(rows, center, reach, g):  # type: ignore[no-untyped-def]
+    """Below which the distance between geom g and anything in a ball cannot lie."""
+    if rows[g, KIND] == OTHER_KIND:
+        d0 = center[0] - rows[g, POSITION]
+        d1 = center[1] - rows[g, POSITION + 1]
+        d2 = center[2] - rows[g, POSITION + 2]
+        return np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) - reach - rows[g, BOUND]
+    distance, _, _, _ = measure(rows, g, center)
+    return distance - reach
+
+
+@kernel
+def _queue_pairs(t, i, g, m, queued):  # type: ignore[no-untyped-def]
+    """Leaves robot i's geoms that may be the nearest to geom g to MuJoCo; returns how many are.
+
+    The margin comes down to what it can be at most: the middle of a geom is within the geom.
+    """
+    clearance = t.clearances[1] if m < t.starts[3] else t.clearances[3]
+    hull = (t.hulls[i, 0], t.hulls[i, 1], t.hulls[i, 2])
+    if _find_gap(t.rows, hull, t.hulls[i, 3], g) >= t.margins[m] + clearance:
+        return queued
+    for a in range(t.robot_rows[i], t.robot_rows[i + 1]):
+        if m >= t.starts[4] and not t.obstacles[a, g]:
+            continue
+        center = (t.rows[a, POSITION], t.rows[a, POSITION + 1], t.rows[a, POSITION + 2])
+        gap = _find_gap(t.rows, center, t.rows[a, BOUND], g)
+        if gap < t.margins[m] + clearance:
+            t.near[queued, 0], t.near[queued, 1], t.near[queued, 2] = a, g, m
+            t.gaps[queued] = gap
+            queued += 1
+            if t.rows[g, KIND] != OTHER_KIND:
+                t.margins[m] = min(t.margins[m], gap + t.rows[a, BOUND] - clearance)
+    return queued
+
+
+@kernel
+def _measure_bodies(t):  # type: ignore[no-untyped-def]
+    """Collisions and obstacles; returns how many pairs of geoms are left to MuJoCo."""
+    n, queued, m = t.own.shape[0], 0, t.starts[2]
+    for i in range(n):
+        for j in range(i + 1, n):
+            if t.upright[i] and t.upright[j]:
+                _measure_discs(t, i, j, m)
+            else:
+                _put(t, m, t.sight - t.clearances[1], t.hulls[i], j)
+                for g in range(t.robot_rows[j], t.robot_rows[j + 1]):
+                    queued = _queue_pairs(t, i, g, m, queued)
+            m += 1
+    for i in range(t.starts[5] - t.starts[4]):
+        m = t.starts[4] + i
+        _put(t, m, t.sight - t.clearances[3], t.hulls[i], -1)
+        for g in range(t.robot_rows[n], t.rows.shape[0]):
+            queued = _queue_pairs(t, i, g, m, queued)
+    return queued
+
+
+@kernel
+def _measure_bounds(t, sites):  # type: ignore[no-untyped-def]
+    """Per robot: how far its site is inside the bounds, negative outside."""
+    for i in range(t.starts[4] - t.starts[3]):
+        inside, square = np.inf, 0.0
+        for c in range(3):
+            gap = min(sites[i, c] - t.bounds[0, c], t.bounds[1, c] - sites[i, c])
+            inside = min(inside, gap)
+            square += min(gap, 0.0) ** 2
+        distance = inside if inside >= 0.0 else -np.sqrt(square)
+        _put(t, t.starts[3] + i, distance - t.clearances[2], sites[i], -1)
+
+
+@kernel
+def measure_margins(t, line, tensions, sites, poses):  # type: ignore[no-untyped-def]
+    """Writes all margins with their places.
+
+    Args:
+        t: Tables (margin_tables.py); `rows` and everything after `obstacles` in it is written.
+        line: arc lengths (K + 1,), m, and coefficients (K, 4, 3), m, of the centre line.
+        tensions: at `samples` (T,), N.
+        sites: where robots and source hold the hose (N + 1, 3), m.
+        poses: MuJoCo's geom_xpos and geom_xmat, m.
+
+    Returns:
+        how many pairs of geoms are left to MuJoCo; their margins stand at the most they can be.
+    """
+    arcs, coefficients = line
+    _place_geoms(t, poses[0], poses[1])
+    update_balls(coefficients, t.balls)
+    _measure_stretch(t, arcs, coefficients, tensions)
+    _measure_run_over(t, arcs, coefficients)
+    _measure_bounds(t, sites)
+    return _measure_bodies(t)

@@ -22,7 +22,7 @@ from hose_mj.scenes.mjcf import Scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.coupling import Bodies
 from hose_mj.world.hose_touch import HoseTouch
-from hose_mj.world.laying import N_POINTS, count_control_points, lay_hose
+from hose_mj.world.laying import count_control_points, relax_hose
 from hose_mj.world.measured_geoms import add_probe
 from hose_mj.world.pucks import Pucks
 from hose_mj.world.world import World
@@ -88,10 +88,10 @@ class GedsWorld(World):
         self._touch = HoseTouch(self.model, self.data, self.hose, self.sites, self.arc_lengths)
         self._touch.set_obstacles(scene.friction)
         self._bodies = Bodies(self.model, self.data, self.sites[:-1])
-        self._start = lay_hose(
+        self._start = relax_hose(
             *(scene.spec, self.site_positions(), self.arc_lengths),
-            *(self.hose.obstacles, self.hose.gravity),
-        )
+            *(self.hose.obstacles, self.hose.gravity, n),
+        ).control_points
         self._pucks = Pucks.find(self, self._touch) if compiled_pucks else None
         self.reset()
 
@@ -110,11 +110,7 @@ class GedsWorld(World):
     def reset(self) -> None:
         """See `World.reset`."""
         self._start_bodies()
-        even = np.linspace(0.0, self.scene.spec.length, N_POINTS)
-        self.hose.reset(lambda s: np.stack([np.interp(s, even, x) for x in self._start.T], axis=1))
-        gaps = self.site_positions() - self.hose.position(self.arc_lengths)
-        rows = self.hose.attachment_jacobian(self.arc_lengths).T
-        self.hose.set_control_points(self.hose.control_points + np.linalg.pinv(rows) @ gaps)
+        self.hose.set_control_points(self._start)
         self._holds = [
             self.hose.attach(float(s), place)
             for s, place in zip(self.arc_lengths, self.site_positions(), strict=True)

@@ -18,11 +18,51 @@ N_POINTS = 257
 _DRAG = 4.0
 """Drag over linear density while the hose comes to rest (1/s)."""
 _STEP, _DURATION = 0.004, 4.0
+_MOST_WAVES = 6
+"""Half waves between neighbours at most."""
 
 
 def count_control_points(n_robots: int) -> int:
     """Control points of a hose with N robots: five spans between neighbours, at least 13 in all."""
     return 3 + max(13, 5 * n_robots)
+
+
+def relax_hose(
+    spec: HoseSpec,
+    places: Array,
+    arc_lengths: Array,
+    obstacles: Sequence[Obstacle],
+    gravity: Array,
+    control_points: int | None = None,
+) -> GedsHose:
+    """Returns a hose at rest that is held at its attachments and lies on what is below it.
+
+    Between neighbours it starts as an arc of a circle or as waves to the side, or hanging, the
+    first of these that is clear of all obstacles or the one that is clearest. Then it moves through
+    a viscous medium until it has found its place. All hose models start from this shape.
+
+    Args:
+        spec: the hose.
+        places: of the attachments, from the tip to the source, (N + 1, 3), m.
+        arc_lengths: theirs, falling to 0, (N + 1,), m.
+        obstacles: what is in the way, at rest; robots among them.
+        gravity: (3,), m/s^2.
+        control_points: of the hose; None for five spans between neighbours.
+    """
+    n = count_control_points(len(places) - 1) if control_points is None else control_points
+    hose = GedsHose(
+        replace(spec, drag=_DRAG * spec.linear_density, damping_time=max(spec.damping_time, 0.02)),
+        timestep=_STEP,
+        gravity=gravity,
+        control_points=n,
+        obstacles=obstacles,
+        scheme="backward-euler",
+    )
+    hose.reset(_draw(hose, places[::-1], arc_lengths[::-1]))
+    for s, place in zip(arc_lengths, places, strict=True):
+        hose.attach(float(s), place)
+    hose.step(round(_DURATION / _STEP))
+    return hose
 
 
 def lay_hose(
@@ -32,41 +72,13 @@ def lay_hose(
     obstacles: Sequence[Obstacle],
     gravity: Array,
 ) -> Array:
-    """Returns a hose at rest that is held at its attachments and lies on what is below it.
-
-    Between neighbours it starts as an arc of a circle to the side, or hanging where there is room
-    for that, whichever is clearest of obstacles, and then moves through a viscous medium until it
-    has found its place. The same for all hose models.
-
-    Args:
-        spec: the hose.
-        places: of the attachments, from the tip to the source, (N + 1, 3), m.
-        arc_lengths: theirs, falling to 0, (N + 1,), m.
-        obstacles: what is in the way, at rest.
-        gravity: (3,), m/s^2.
-
-    Returns:
-        points spread evenly from arc length 0 to L, (257, 3), m.
-    """
-    hose = GedsHose(
-        replace(spec, drag=_DRAG * spec.linear_density, damping_time=max(spec.damping_time, 0.02)),
-        timestep=_STEP,
-        gravity=gravity,
-        control_points=count_control_points(len(places) - 1),
-        obstacles=obstacles,
-        scheme="backward-euler",
-    )
-    even = np.linspace(0.0, spec.length, N_POINTS)
-    first = _draw_arcs(hose, places[::-1], arc_lengths[::-1])
-    hose.reset(first)
-    for s, place in zip(arc_lengths, places, strict=True):
-        hose.attach(float(s), place)
-    hose.step(round(_DURATION / _STEP))
-    return hose.position(even)
+    """Returns points of `relax_hose` spread evenly from arc length 0 to L, (257, 3), m."""
+    hose = relax_hose(spec, places, arc_lengths, obstacles, gravity)
+    return hose.position(np.linspace(0.0, spec.length, N_POINTS))
 
 
-def _draw_arcs(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
-    """Arcs of circles from the source to the tip; a free end goes straight on. (257, 3), m."""
+def _draw(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
+    """The first shape, from the source to the tip; a free end goes straight on. (257, 3), m."""
     even = np.linspace(0.0, hose.spec.length, N_POINTS)
     points = np.zeros((N_POINTS, 3))
     last = np.array([1.0, 0.0, 0.0])
@@ -75,21 +87,33 @@ def _draw_arcs(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
         parts = (even[mine] - s) / (end - s)
         chord = target - place
         direction = chord / max(float(np.linalg.norm(chord)), 1e-12)
+        if not np.hypot(direction[0], direction[1]) > 1e-9:
+            direction = last
         side = np.cross([0.0, 0.0, 1.0], direction)
-        if not np.linalg.norm(side) > 1e-9:
-            direction, side = last, np.cross([0.0, 0.0, 1.0], last)
         side /= np.linalg.norm(side)
-        choices = [
-            _draw_arc(place, chord, end - s, parts, bulge)
-            for bulge in (side, -side, np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]))
+        down = np.array([0.0, 0.0, -1.0])
+        choices = [_draw_arc(place, chord, end - s, parts, bulge) for bulge in (side, -side)]
+        choices += [
+            _draw_waves(place, chord, end - s, parts, bulge, count)
+            for count in range(2, _MOST_WAVES + 1)
+            for bulge in (side, -side)
         ]
-        enough = 0.99 * hose.spec.radius
-        clear = [hose.measure_obstacles(c).min(initial=enough) for c in choices]
+        choices += [_draw_arc(place, chord, end - s, parts, bulge) for bulge in (down, -down)]
+        clear = [_find_clearance(hose, even[mine], choice) for choice in choices]
         points[mine] = choices[int(np.argmax(clear))]
         last = direction
     beyond = even > arc_lengths[-1]
     points[beyond] = places[-1] + (even[beyond] - arc_lengths[-1])[:, None] * last
     return points
+
+
+def _find_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:
+    """Least distance of points (k, 3) of the hose from obstacles, nearly a radius at most (m)."""
+    distances = hose.measure_obstacles(points)
+    for row, obstacle in zip(distances, hose.obstacles, strict=True):
+        low, high = obstacle.skips
+        row[(arc_lengths >= low) & (arc_lengths <= high)] = np.inf
+    return float(distances.min(initial=0.99 * hose.spec.radius))
 
 
 def _draw_arc(start: Array, chord: Array, length: float, parts: Array, bulge: Array) -> Array:
@@ -108,3 +132,21 @@ def _draw_arc(start: Array, chord: Array, length: float, parts: Array, bulge: Ar
     x = radius * (np.sin(angles) + np.sin(low))
     y = radius * (np.cos(angles) - np.cos(low))
     return np.asarray(start + x[:, None] * along + y[:, None] * bulge)
+
+
+def _draw_waves(
+    start: Array, chord: Array, length: float, parts: Array, bulge: Array, count: int
+) -> Array:
+    """Points at parts (k,) of so many half waves of this length along a chord, (k, 3)."""
+    t = np.linspace(0.0, 1.0, 400)
+    wave = np.sin(count * np.pi * t)
+    low, high = 0.0, length
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        line = t[:, None] * chord + middle * wave[:, None] * bulge
+        arcs = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        low, high = (middle, high) if arcs[-1] < length else (low, middle)
+    at = np.interp(parts, arcs / arcs[-1], t)
+    return np.asarray(
+        start + at[:, None] * chord + low * np.sin(count * np.pi * at)[:, None] * bulge
+    )

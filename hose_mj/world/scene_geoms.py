@@ -62,7 +62,7 @@ class SceneGeoms:
         return cls(ids, measured, moving, skips[ids], skips[measured])
 
     def make_obstacles(
-        self, model: mujoco.MjModel, data: mujoco.MjData, friction: float, stiffness: float
+        self, model: mujoco.MjModel, data: mujoco.MjData, friction: float, stiffness: float = 0.0
     ) -> list[Obstacle]:
         """Returns the obstacles at the poses in `data`, at rest.
 
@@ -71,7 +71,7 @@ class SceneGeoms:
             data: MuJoCo's.
             friction: Coulomb's coefficient.
             stiffness: force per length and depth that a body is to feel with a delay of one step,
-                N/m^2; where it is too light for that, its contact is softer.
+                N/m^2; where it is too light for that, its contact is softer. 0 for no such thing.
         """
         masses = np.zeros(model.nbody)
         np.add.at(masses, model.body_weldid, model.body_mass)
@@ -80,7 +80,8 @@ class SceneGeoms:
             g = self.ids[place]
             felt = stiffness * 2.0 * model.geom_rbound[g] * model.opt.timestep**2
             mass = masses[model.body_weldid[model.geom_bodyid[g]]]
-            factors[place] = min(1.0, max(_LARGEST_KICK * mass / felt, 1e-6))
+            if felt > 0.0:
+                factors[place] = min(1.0, max(_LARGEST_KICK * mass / felt, 1e-6))
         return [
             Obstacle(
                 kind=KIND_NAMES[int(model.geom_type[g])],

@@ -37,6 +37,7 @@ class Driver:
     Attributes:
         world: as given.
         targets: where the sites are to be (N, 3), m; at first where they are.
+        speed: highest speed (m/s).
         axes: along how many axes each robot is driven (N,): 3 or, in the plane, 2.
 
     Raises:
@@ -53,13 +54,14 @@ class Driver:
             speed = math.sqrt(BRAKING * world.scene.cell_size)
         if not 0.0 < speed < math.inf:
             raise InputError("speed", speed, "a finite number above 0 (m/s)")
-        self.world = world
+        self.world, self.speed = world, speed
         self.targets = world.site_positions()[:-1]
         self.axes = np.full(world.n_robots, 2)
         self._wheeled: list[int] = []
         sliding: list[Motors] = []
         servos: list[ArmServo | WheelServo | SlideServo] = []
-        for motors in find_motors(world):
+        self._motors = find_motors(world)
+        for motors in self._motors:
             chain = motors.choose(motors.in_chain)
             wheels = motors.choose(~motors.in_chain)
             axes = find_axes(world, chain)
@@ -105,6 +107,16 @@ class Driver:
         """Writes the motors' controls for the next step; to be called before each."""
         for servo in self._servos:
             servo.update(self.targets)
+
+    def rest(self, robot: int) -> None:
+        """Lets a robot's motors do nothing in the next step."""
+        self.world.control[self._motors[robot].ids] = 0.0
+
+    def find_speeds(self) -> Array:
+        """How fast each robot's site moves along the axes it is driven in (N,), m/s."""
+        velocities = self.world.site_velocities()[:-1]
+        velocities[self.axes == 2, 2] = 0.0
+        return np.sqrt(np.einsum("ij,ij->i", velocities, velocities))
 
     def find_error(self) -> Array:
         """How far each robot's site is from its target along the axes it is driven in (N,), m."""

@@ -1,0 +1,100 @@
+"""Which of several scripts does what is wanted, found by playing each and going back.
+
+A robot in a corridor cannot be told to stretch a hose by geometry alone: the hose hangs, catches
+and whips. So the scripts are tried in order, on the world itself where its hose is a spline, and on
+a spline hose in the same scene where it is one of MuJoCo's, which would take far longer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from hose_mj.constraints.breaks import Break
+from hose_mj.constraints.monitor import Monitor
+from hose_mj.errors import StepError
+from hose_mj.rollout.episode import is_at_goal
+from hose_mj.rollout.scripts import Player, Script
+from hose_mj.world.driving import Driver
+from hose_mj.world.registry import make_world
+from hose_mj.world.world import World
+
+SLOW_MODELS = ("cable", "flex")
+MOST_TRIALS = 16
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came of a script.
+
+    Attributes:
+        script: played.
+        end: its first break; None where there was none.
+        at_goal: whether the tip reached the goal before.
+        time: when it ended (s).
+    """
+
+    script: Script
+    end: Break | None
+    at_goal: bool
+    time: float
+
+
+class Rehearsal:
+    """Plays scripts from the state that a world is in.
+
+    Args:
+        world: not changed, but for the time that a trial takes.
+        monitor: of the world.
+        ends_at_goal: whether a trial is over when the tip is at the goal.
+        horizon: simulated time of a trial (s).
+    """
+
+    def __init__(
+        self, world: World, monitor: Monitor, *, ends_at_goal: bool, horizon: float = 5.0
+    ) -> None:
+        self._ends_at_goal, self._horizon = ends_at_goal, horizon
+        if world.hose_model in SLOW_MODELS:
+            world = make_world(world.scene)
+            monitor = Monitor(world, monitor.limits)
+        self._world, self._monitor = world, monitor
+
+    def find(
+        self, scripts: Iterable[Script], is_wanted: Callable[[Trial], bool]
+    ) -> tuple[Trial | None, list[Trial]]:
+        """Returns the first trial that is as wanted, None if none is, and all trials made."""
+        trials: list[Trial] = []
+        for script in scripts:
+            if len(trials) == MOST_TRIALS:
+                break
+            trial = self._play(script)
+            trials.append(trial)
+            if is_wanted(trial):
+                return trial, trials
+        return None, trials
+
+    def _play(self, script: Script) -> Trial:
+        world, monitor = self._world, self._monitor
+        before = world.snapshot()
+        begun = world.time
+        monitor.reset()
+        driver = Driver(world)
+        player = Player(driver, script, find_pace(driver))
+        end, at_goal = None, False
+        try:
+            while end is None and not at_goal and world.time - begun < self._horizon:
+                player.update()
+                world.step()
+                end = monitor.check()
+                at_goal = self._ends_at_goal and end is None and is_at_goal(world)
+            return Trial(script, end, at_goal, world.time - begun)
+        except StepError:
+            return Trial(script, None, False, world.time - begun)
+        finally:
+            world.restore(before)
+            monitor.reset()
+
+
+def find_pace(driver: Driver) -> float:
+    """Speed at which targets move (m/s): the robots', but half of it for bases that must turn."""
+    return driver.speed * (0.5 if driver.wheeled else 1.0)

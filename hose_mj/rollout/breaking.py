@@ -10,13 +10,15 @@ import numpy as np
 
 from hose_mj.hoses.model import Array
 from hose_mj.rollout.obstacles import Obstacles, find_footprint
-from hose_mj.rollout.scripts import Script, move
+from hose_mj.rollout.scripts import Script, move, relax
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
 _BEYOND = 1.5
 """How much farther than a segment is long its ends are driven apart."""
+_BEHIND = 0.5
+"""How far behind an obstacle or a bound a robot is driven, in cells."""
 _SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)
 """Where along a segment it is run over, the middle first."""
 
@@ -80,46 +82,34 @@ def list_collisions(driver: Driver) -> list[Script]:
 
 
 def list_exits(driver: Driver) -> list[Script]:
-    """Robots driven out of the bounds: one alone, with those behind it in proportion, or all."""
+    """A robot driven out of the bounds, the nearest first."""
     world = driver.world
-    sites, arcs = world.site_positions(), world.arc_lengths
+    sites = world.site_positions()
     found: list[tuple[float, Script]] = []
     for robot in range(world.n_robots):
         for axis in range(driver.axes[robot]):
             for bound, sense in zip(world.scene.bounds, (-1.0, 1.0), strict=True):
-                if not math.isfinite(bound[axis]):
-                    continue
-                distance = abs(bound[axis] - sites[robot, axis])
-                step = np.zeros(3)
-                step[axis] = sense * (distance + world.scene.cell_size)
-                shares = np.minimum(1.0, arcs[:-1] / arcs[robot])
-                for k, changed in enumerate(
-                    ({robot: sites[robot] + step}, _move_all(sites, step, shares))
-                ):
-                    found.append((distance * (1.0 + 0.5 * k), move(world, robot, changed)))
+                if math.isfinite(bound[axis]):
+                    distance = abs(bound[axis] - sites[robot, axis])
+                    step = np.zeros(3)
+                    step[axis] = sense * (distance + _BEHIND * world.scene.cell_size)
+                    found += _list_ways(driver, robot, step)
     return [script for _, script in sorted(found, key=lambda item: item[0])]
 
 
 def list_obstacles(driver: Driver) -> list[Script]:
     """A robot driven at an obstacle, the nearest first."""
     world = driver.world
-    sites = world.site_positions()
-    arcs = world.arc_lengths
     found: list[tuple[float, Script]] = []
     for robot in range(world.n_robots):
         obstacles = Obstacles(world, robot)
         for geom in obstacles.others:
-            distance, towards = obstacles.find(int(geom), np.zeros(3), world.scene.spec.length)
+            _, towards = obstacles.find(int(geom), np.zeros(3), world.scene.spec.length)
             towards[driver.axes[robot] :] = 0.0
             length = float(np.linalg.norm(towards))
-            if length == 0.0:
-                continue
-            step = towards * (1.0 + world.scene.cell_size / length)
-            shares = np.minimum(1.0, arcs[:-1] / arcs[robot])
-            for k, changed in enumerate(
-                ({robot: sites[robot] + step}, _move_all(sites, step, shares))
-            ):
-                found.append((distance * (1.0 + 0.5 * k), move(world, robot, changed)))
+            if length > 0.0:
+                step = towards * (1.0 + _BEHIND * world.scene.cell_size / length)
+                found += _list_ways(driver, robot, step)
     return [script for _, script in sorted(found, key=lambda item: item[0])]
 
 
@@ -133,8 +123,18 @@ LISTS: dict[str, Callable[[Driver], list[Script]]] = {
 """What to try for each kind of break."""
 
 
-def _move_all(sites: Array, step: Array, shares: Array) -> dict[int, Array]:
-    return {k: sites[k] + share * step for k, share in enumerate(shares)}
+def _list_ways(driver: Driver, robot: int, step: Array) -> list[tuple[float, Script]]:
+    """A robot moves by a step, alone or with others so that segments stay slack; and how far."""
+    world = driver.world
+    sites = world.site_positions()
+    distance = float(np.linalg.norm(step))
+    alone = move(world, robot, {robot: sites[robot] + step})
+    spans = -np.diff(world.arc_lengths)
+    ways = [(distance, alone)]
+    for cost, slack in ((1.2, 0.9), (2.0, 0.75)):
+        together = relax(alone.formations[0], robot, sites[-1], slack * spans)
+        ways.append((cost * distance, Script(robot, together[None])))
+    return ways
 
 
 def _sort(driver: Driver, scripts: list[Script], room: float) -> list[Script]:

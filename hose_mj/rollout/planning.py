@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import heapq
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from hose_mj.hoses.model import Array
 from hose_mj.rollout.obstacles import Obstacles, find_footprint
-from hose_mj.rollout.scripts import Script
+from hose_mj.rollout.scripts import Script, relax
 from hose_mj.world.actions import find_cells, find_centres
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
 Cell = tuple[int, int, int]
 HOSE_SAMPLES = 129
-_PASSES = 20
 _CLEARANCE = 0.15
 """Distance kept to obstacles, as a share of a cell."""
 
@@ -26,15 +26,16 @@ class Cells:
 
     Args:
         driver: of the world.
+        start: where the tip's site starts (3,), m.
         hose: whether cells that the hose covers are held, away from the tip's own place on it.
     """
 
-    def __init__(self, driver: Driver, *, hose: bool) -> None:
+    def __init__(self, driver: Driver, start: Array, *, hose: bool) -> None:
         world = driver.world
         self._world, self._size = world, world.scene.cell_size
         self._spatial = bool(driver.axes[0] == 3)
         self._obstacles = Obstacles(world, 0)
-        self._site = world.site_positions()[0]
+        self._site, self._start = world.site_positions()[0], start
         self._radius = find_footprint(world, 0)
         self._held, self._apart = self._list_held(hose)
         self._known: dict[Cell, bool] = {}
@@ -78,7 +79,7 @@ class Cells:
 
         Diagonal steps need the cells on both sides of them free. The goal itself counts as free.
         """
-        start: Cell = self._cell_of(self._site)
+        start = self._cell_of(self._start)
         reach = int(np.ceil(self._world.scene.spec.length / self._size)) + 1
         before: dict[Cell, Cell] = {}
         cost = {start: 0.0}
@@ -113,43 +114,66 @@ class Cells:
         return self._cell_of(self._world.goal_position())
 
 
-def plan_to_goal(driver: Driver, *, slack: float, hose: bool) -> Script | None:
-    """The tip goes to the goal by the shortest free way; the others follow its trail.
+@dataclass(frozen=True)
+class Plan:
+    """How the tip is brought to the goal.
 
-    The trail leads from the source over the robots to the tip and on along the tip's way. A robot
-    moves along it when the next one has gone farther than the share `slack` of the hose between
-    them; where the hose behind it is too short for that, all give way (`_relax`).
-
-    Args:
-        driver: of the world.
+    Attributes:
+        rise: cells by which robots that can rise do so first; a hose that hangs low catches.
+        avoid: whether the tip avoids the hose; where it is all around, there is no such way.
+        pace: how fast, as a share of what the robots can.
         slack: share of a segment that two neighbours may be apart.
-        hose: whether the tip avoids the hose; where it is all around, there is no such way.
-
-    Returns:
-        None where there is no way.
     """
-    world = driver.world
-    cells = Cells(driver, hose=hose)
-    path = cells.find_path(cells.find_goal())
-    if path is None:
-        return None
-    places = world.site_positions()
-    way = find_centres(world, np.array(path[1:] or path))
-    if driver.axes[0] != 3:
-        way[:, 2] = places[0, 2]
-    way[-1] = np.where([True, True, driver.axes[0] == 3], world.goal_position(), way[-1])
-    spans = slack * -np.diff(world.arc_lengths)
-    trail = _Trail(np.concatenate([places[-2::-1], way]))
-    along = trail.arcs[: world.n_robots][::-1].copy()
-    formations = []
-    for k in range(len(way)):
-        along[0] = trail.arcs[world.n_robots + k]
-        for robot in range(1, world.n_robots):
-            ahead = trail.find(along[robot - 1])
-            along[robot] = trail.follow(along[robot], along[robot - 1], ahead, spans[robot - 1])
-        formation = np.array([trail.find(s) for s in along])
-        formations.append(_relax(formation, places[-1], spans))
-    return Script(0, np.array(formations))
+
+    rise: int
+    avoid: bool
+    pace: float
+    slack: float
+
+    def make_script(self, driver: Driver) -> Script | None:
+        """The tip goes to the goal by the shortest free way; the others follow its trail.
+
+        The trail leads from the source over the robots to the tip and on along the tip's way. A
+        robot moves along it when the next one has gone farther than the slack allows; where the
+        hose behind it is too short for that, all give way (`relax`).
+
+        Returns:
+            None where there is no way.
+        """
+        world = driver.world
+        n, source = world.n_robots, world.site_positions()[-1]
+        spans = self.slack * -np.diff(world.arc_lengths)
+        places = self._rise(driver)
+        cells = Cells(driver, places[0], hose=self.avoid)
+        path = cells.find_path(cells.find_goal())
+        if path is None:
+            return None
+        way = find_centres(world, np.array(path[1:] or path))
+        way[-1] = world.goal_position()
+        if driver.axes[0] != 3:
+            way[:, 2] = places[0, 2]
+        trail = _Trail(np.concatenate([places[::-1], way]))
+        along = trail.arcs[:n][::-1].copy()
+        formations = [places] if self.rise else []
+        for k in range(len(way)):
+            along[0] = trail.arcs[n + k]
+            for robot in range(1, n):
+                ahead = trail.find(along[robot - 1])
+                along[robot] = trail.follow(
+                    *(along[robot], along[robot - 1], ahead, spans[robot - 1])
+                )
+            formation = np.array([trail.find(s) for s in along])
+            formations.append(relax(formation, 0, source, spans))
+        return Script(0, np.array(formations), self.pace)
+
+    def _rise(self, driver: Driver) -> Array:
+        """Where the robots are once they have risen (N, 3), m."""
+        world = driver.world
+        places = world.site_positions()[:-1]
+        size, spatial = world.scene.cell_size, driver.axes == 3
+        highest = np.maximum(places[:, 2], world.scene.bounds[1][2] - size)
+        places[spatial, 2] = np.minimum(places[:, 2] + self.rise * size, highest)[spatial]
+        return places
 
 
 class _Trail:
@@ -169,27 +193,6 @@ class _Trail:
             if np.linalg.norm(self.find(float(s)) - ahead) <= span:
                 return float(s)
         return most
-
-
-def _relax(formation: Array, source: Array, spans: Array) -> Array:
-    """Draws robots together until no two neighbours, the source included, are too far apart.
-
-    The tip stays. Forward and backward passes alternate, as in Aristidou and Lasenby's FABRIK
-    (2011), but with lengths that are limits: they end at such a formation where there is one.
-    """
-    chain = np.concatenate([formation, source[None]])
-    for _ in range(_PASSES):
-        for k in range(1, len(formation)):
-            chain[k] = _draw(chain[k], chain[k - 1], spans[k - 1])
-        for k in range(len(formation) - 1, 0, -1):
-            chain[k] = _draw(chain[k], chain[k + 1], spans[k])
-    return chain[:-1]
-
-
-def _draw(place: Array, other: Array, span: float) -> Array:
-    away = place - other
-    distance = float(np.linalg.norm(away))
-    return place if distance <= span else np.asarray(other + away * span / distance)
 
 
 def _distance(cell: Cell, goal: Cell) -> float:

@@ -15,15 +15,20 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_choice
 from hose_mj.rollout.breaking import LISTS
 from hose_mj.rollout.episode import Policy
-from hose_mj.rollout.planning import plan_to_goal
-from hose_mj.rollout.rehearsal import Rehearsal, Trial, find_pace
+from hose_mj.rollout.planning import Plan
+from hose_mj.rollout.rehearsal import Rehearsal, Trial
 from hose_mj.rollout.scripts import Player, Script, move
 from hose_mj.world.actions import Actions, Mode
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
-_PLANS = tuple((slack, hose) for hose in (True, False) for slack in (0.85, 0.95, 0.7))
-"""Ways to the goal that are tried: how slack segments stay, and whether the tip avoids the hose."""
+_LEVEL_PLANS = tuple(
+    Plan(0, avoid, pace, slack)
+    for avoid in (True, False)
+    for pace in (1.0, 0.5)
+    for slack in (0.85, 0.95, 0.75)
+)
+_RISING_PLANS = tuple(Plan(3, True, pace, slack) for pace in (1.0, 0.7) for slack in (0.85, 0.95))
 
 
 class Random:
@@ -71,16 +76,17 @@ class ToGoal:
     def start(self, world: World, monitor: Monitor, generator: np.random.Generator) -> None:
         """Plans and rehearses."""
         driver = Driver(world)
-        plans = (plan_to_goal(driver, slack=slack, hose=hose) for slack, hose in _PLANS)
+        plans = (_RISING_PLANS if np.any(driver.axes == 3) else ()) + _LEVEL_PLANS
+        scripts = (plan.make_script(driver) for plan in plans)
         rehearsal = Rehearsal(world, monitor, ends_at_goal=True)
         found, trials = rehearsal.find(
-            (plan for plan in plans if plan is not None), lambda trial: trial.at_goal
+            (script for script in scripts if script is not None), lambda trial: trial.at_goal
         )
         straight = move(world, 0, {0: world.goal_position()})
         longest = max(trials, key=lambda trial: trial.time, default=None)
         best = found or longest
         self._script = best.script if best else straight
-        self._player = Player(driver, self._script, find_pace(driver))
+        self._player = Player(driver, self._script)
 
     def update(self) -> None:
         """Drives all."""
@@ -125,7 +131,7 @@ class Breaking:
             )
             raise InputError("policy", f"break-{self.kind}", valid)
         self._script = found.script
-        self._player = Player(driver, found.script, find_pace(driver))
+        self._player = Player(driver, found.script)
 
     def update(self) -> None:
         """Drives all."""

@@ -79,7 +79,7 @@ class Rehearsal:
         begun = world.time
         monitor.reset()
         driver = Driver(world)
-        player = Player(driver, script, find_pace(driver))
+        player = Player(driver, script)
         end, at_goal = None, False
         try:
             while end is None and not at_goal and world.time - begun < self._horizon:
@@ -93,8 +93,3 @@ class Rehearsal:
         finally:
             world.restore(before)
             monitor.reset()
-
-
-def find_pace(driver: Driver) -> float:
-    """Speed at which targets move (m/s): the robots', but half of it for bases that must turn."""
-    return driver.speed * (0.5 if driver.wheeled else 1.0)

@@ -22,10 +22,12 @@ class Script:
     Attributes:
         robot: the one it is about.
         formations: (k, N, 3), m.
+        pace: how fast it is played, as a share of what the robots can.
     """
 
     robot: int
     formations: Array
+    pace: float = 1.0
 
 
 def move(world: World, robot: int, *changes: dict[int, Array]) -> Script:
@@ -39,17 +41,51 @@ def move(world: World, robot: int, *changes: dict[int, Array]) -> Script:
     return Script(robot, np.array(formations))
 
 
+def relax(formation: Array, fixed: int, source: Array, spans: Array) -> Array:
+    """Draws robots together until no two neighbours, the source included, are too far apart.
+
+    Passes up and down the hose alternate, as in Aristidou and Lasenby's FABRIK (2011), but with
+    lengths that are limits: they end at such a formation where there is one.
+
+    Args:
+        formation: places of the sites (N, 3), m.
+        fixed: the robot that stays.
+        source: where the hose begins (3,), m.
+        spans: how far each robot may be from the next one along the hose (N,), m.
+    """
+    chain = np.concatenate([formation, source[None]])
+    n = len(formation)
+    for _ in range(_PASSES):
+        for k in range(fixed + 1, n):
+            chain[k] = _draw(chain[k], chain[k - 1], spans[k - 1])
+        for k in range(n - 1, fixed, -1):
+            chain[k] = _draw(chain[k], chain[k + 1], spans[k])
+    for k in range(fixed - 1, -1, -1):
+        chain[k] = _draw(chain[k], chain[k + 1], spans[k])
+    return chain[:-1]
+
+
+def _draw(place: Array, other: Array, span: float) -> Array:
+    away = place - other
+    distance = float(np.linalg.norm(away))
+    return place if distance <= span else np.asarray(other + away * span / distance)
+
+
+_PASSES = 20
+
+
 class Player:
     """Drives the robots of a world through a script, then holds them at its end.
 
     Args:
         driver: of the world.
         script: its formations.
-        speed: of the robot that moves farthest between two formations (m/s).
     """
 
-    def __init__(self, driver: Driver, script: Script, speed: float) -> None:
+    def __init__(self, driver: Driver, script: Script) -> None:
         self._driver, self.script = driver, script
+        # Bases have to turn before they drive.
+        speed = script.pace * driver.speed * (0.5 if driver.wheeled else 1.0)
         self._formations = np.concatenate([driver.targets[None], script.formations])
         steps = np.linalg.norm(np.diff(self._formations, axis=0), axis=2).max(axis=1)
         self._times = np.concatenate([[0.0], np.cumsum(steps / speed)])

@@ -35,7 +35,11 @@ class Policy(Protocol):
         ...
 
     def describe(self) -> Mapping[str, Any]:
-        """What it does now: `robot` and `action`, `stalled_count`, and what else it knows."""
+        """What it does now, all optional.
+
+        `turn` (its number), `owner` (the name of the robot whose turn it is), `action`, `vetoed`
+        (names of actions), `stalled` (actions given up so far).
+        """
         ...
 
 
@@ -63,14 +67,14 @@ class Outcome:
         steps: of the world.
         sim_time: simulated (s).
         ended_by: "break", "goal" or "duration".
-        end: the break that ended it; None where none did.
+        broken: the break that ended it; None where none did.
         stalled: actions that robots gave up.
     """
 
     steps: int
     sim_time: float
     ended_by: Literal["break", "goal", "duration"]
-    end: Break | None
+    broken: Break | None
     stalled: int
 
 
@@ -121,14 +125,14 @@ def run_episode(
         observer.start(world, monitor, settings or {})
     begun, steps, sampled = world.time, 0, 0
     most = max(1, round(duration / world.timestep))
-    end, ended_by = None, None
+    broken, ended_by = None, None
     _sample(observers, world, monitor, policy)
     while ended_by is None:
         policy.update()
         world.step()
         steps += 1
-        end = monitor.check()
-        if end is not None:
+        broken = monitor.check()
+        if broken is not None:
             ended_by = "break"
         elif policy.ends_at_goal and is_at_goal(world):
             ended_by = "goal"
@@ -138,8 +142,8 @@ def run_episode(
         if due > sampled or ended_by is not None:
             sampled = due
             _sample(observers, world, monitor, policy)
-    stalled = int(policy.describe().get("stalled_count", 0))
-    outcome = Outcome(steps, world.time - begun, ended_by, end, stalled)
+    stalled = int(policy.describe().get("stalled", 0))
+    outcome = Outcome(steps, world.time - begun, ended_by, broken, stalled)
     for observer in observers:
         observer.finish(outcome)
     return outcome

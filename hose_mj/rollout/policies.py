@@ -17,7 +17,7 @@ from hose_mj.rollout.breaking import LISTS
 from hose_mj.rollout.episode import Policy
 from hose_mj.rollout.planning import Plan
 from hose_mj.rollout.rehearsal import Rehearsal, Trial
-from hose_mj.rollout.scripts import Player, Script, move
+from hose_mj.rollout.scripts import Player, move
 from hose_mj.world.actions import Actions, Mode
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
@@ -47,13 +47,11 @@ class Random:
         """Begins with the tip's robot."""
         self._generator = generator
         self._actions = Actions(Driver(world), self._mode)
-        self._stalled = 0
 
     def update(self) -> None:
         """Lets the next robot begin where the last has done, then drives all."""
         actions = self._actions
         if actions.is_done():
-            self._stalled += actions.stalled
             robot = 0 if actions.robot is None else (actions.robot + 1) % actions.world.n_robots
             names = [name for name in actions.list_names(robot) if name != "none"]
             actions.begin(robot, names[self._generator.integers(len(names))])
@@ -61,7 +59,7 @@ class Random:
 
     def describe(self) -> Mapping[str, Any]:
         """The turn's owner and its move."""
-        return {**self._actions.describe(), "stalled_count": self._stalled}
+        return self._actions.describe()
 
 
 class ToGoal:
@@ -85,8 +83,8 @@ class ToGoal:
         straight = move(world, 0, {0: world.goal_position()})
         longest = max(trials, key=lambda trial: trial.time, default=None)
         best = found or longest
-        self._script = best.script if best else straight
-        self._player = Player(driver, self._script)
+        self._player = Player(driver, best.script if best else straight)
+        self._owner = world.scene.robots[0].name
 
     def update(self) -> None:
         """Drives all."""
@@ -94,7 +92,7 @@ class ToGoal:
 
     def describe(self) -> Mapping[str, Any]:
         """That the tip's robot goes to the goal."""
-        return {"robot": 0, "action": "to goal"}
+        return {"owner": self._owner, "action": "to the goal"}
 
 
 class Breaking:
@@ -110,7 +108,6 @@ class Breaking:
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
-        self._script: Script | None = None
 
     def start(self, world: World, monitor: Monitor, generator: np.random.Generator) -> None:
         """Finds a script.
@@ -130,8 +127,8 @@ class Breaking:
                 f"another constraint first or none"
             )
             raise InputError("policy", f"break-{self.kind}", valid)
-        self._script = found.script
         self._player = Player(driver, found.script)
+        self._owner = world.scene.robots[found.script.robot].name
 
     def update(self) -> None:
         """Drives all."""
@@ -139,11 +136,10 @@ class Breaking:
 
     def describe(self) -> Mapping[str, Any]:
         """Which robot breaks what."""
-        robot = self._script.robot if self._script else None
-        return {"robot": robot, "action": f"break {self.kind}"}
+        return {"owner": self._owner, "action": f"break {self.kind}"}
 
     def _is_wanted(self, trial: Trial) -> bool:
-        return trial.end is not None and trial.end.kind == self.kind
+        return trial.broken is not None and trial.broken.kind == self.kind
 
 
 _WANTED = {

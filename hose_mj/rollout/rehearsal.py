@@ -20,7 +20,11 @@ from hose_mj.world.registry import make_world
 from hose_mj.world.world import World
 
 SLOW_MODELS = ("cable", "flex")
-MOST_TRIALS = 16
+MOST_TRIALS = 24
+LONGEST = 5.0
+"""Simulated time of a trial at most (s)."""
+PATIENCE = 1.5
+"""How much longer than its targets take a trial goes on, and a second more."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +33,13 @@ class Trial:
 
     Attributes:
         script: played.
-        end: its first break; None where there was none.
+        broken: its first break; None where there was none.
         at_goal: whether the tip reached the goal before.
         time: when it ended (s).
     """
 
     script: Script
-    end: Break | None
+    broken: Break | None
     at_goal: bool
     time: float
 
@@ -47,13 +51,10 @@ class Rehearsal:
         world: not changed, but for the time that a trial takes.
         monitor: of the world.
         ends_at_goal: whether a trial is over when the tip is at the goal.
-        horizon: simulated time of a trial (s).
     """
 
-    def __init__(
-        self, world: World, monitor: Monitor, *, ends_at_goal: bool, horizon: float = 5.0
-    ) -> None:
-        self._ends_at_goal, self._horizon = ends_at_goal, horizon
+    def __init__(self, world: World, monitor: Monitor, *, ends_at_goal: bool) -> None:
+        self._ends_at_goal = ends_at_goal
         if world.hose_model in SLOW_MODELS:
             world = make_world(world.scene)
             monitor = Monitor(world, monitor.limits)
@@ -80,14 +81,15 @@ class Rehearsal:
         monitor.reset()
         driver = Driver(world)
         player = Player(driver, script)
-        end, at_goal = None, False
+        most = min(LONGEST, PATIENCE * player.time + 1.0)
+        broken, at_goal = None, False
         try:
-            while end is None and not at_goal and world.time - begun < self._horizon:
+            while broken is None and not at_goal and world.time - begun < most:
                 player.update()
                 world.step()
-                end = monitor.check()
-                at_goal = self._ends_at_goal and end is None and is_at_goal(world)
-            return Trial(script, end, at_goal, world.time - begun)
+                broken = monitor.check()
+                at_goal = self._ends_at_goal and broken is None and is_at_goal(world)
+            return Trial(script, broken, at_goal, world.time - begun)
         except StepError:
             return Trial(script, None, False, world.time - begun)
         finally:

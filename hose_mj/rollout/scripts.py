@@ -80,6 +80,10 @@ class Player:
     Args:
         driver: of the world.
         script: its formations.
+
+    Attributes:
+        script: as given.
+        time: when the targets are at its end (s).
     """
 
     def __init__(self, driver: Driver, script: Script) -> None:
@@ -90,6 +94,7 @@ class Player:
         steps = np.linalg.norm(np.diff(self._formations, axis=0), axis=2).max(axis=1)
         self._times = np.concatenate([[0.0], np.cumsum(steps / speed)])
         self._begun = driver.world.time
+        self.time = float(self._times[-1])
 
     def update(self) -> None:
         """Writes the controls of the next step."""

@@ -70,6 +70,7 @@ class Actions:
         names: of the actions, with +z and -z where a robot is driven along three axes.
         stalled: whether the last action was given up.
         robot, action: the robot that acts and what it does; None before the first action.
+        turns, n_stalled: how many actions were begun and given up so far.
 
     Raises:
         InputError: an unknown mode, or a number that is not above 0.
@@ -92,8 +93,9 @@ class Actions:
         self.stalled = False
         self.robot: int | None = None
         self.action: str | None = None
+        self.turns = self.n_stalled = 0
         self._begun = 0.0
-        self._pushes = False
+        self._runs = self._pushes = False
 
     def list_names(self, robot: int) -> tuple[str, ...]:
         """The actions that a robot has."""
@@ -113,10 +115,10 @@ class Actions:
             raise InputError("robot", robot, f"0 (tip) to {self.world.n_robots - 1}")
         check_choice("action", action, self.list_names(robot))
         step = np.array(STEPS[action])
-        if self.robot is not None and not self.is_done():
-            self._end()
+        self._end()
         self.robot, self.action, self.stalled = robot, action, False
-        self._begun = self.world.time
+        self.turns += 1
+        self._begun, self._runs = self.world.time, True
         self._pushes = self.mode == "force" and action != "none"
         if self._pushes:
             self.world.apply_force(robot, self._force * step)
@@ -135,34 +137,43 @@ class Actions:
             self.driver.rest(self.robot)
 
     def is_done(self) -> bool:
-        """Whether the action has ended, to be asked after each step; ends it."""
-        if self.robot is None:
-            return True
-        elapsed = self.world.time - self._begun
-        if self.mode == "force":
-            done = elapsed >= self._force_time - 0.5 * self.world.timestep
-            if done:
+        """Whether the action has ended, to be asked after each step."""
+        if self._runs and self.robot is not None:
+            elapsed = self.world.time - self._begun
+            if self.mode == "force":
+                ended = elapsed >= self._force_time - 0.5 * self.world.timestep
+            else:
+                arrived = elapsed > 0.0 and self._has_arrived(self.robot)
+                self.stalled = not arrived and elapsed >= self.patience
+                self.n_stalled += self.stalled
+                ended = arrived or self.stalled
+            if ended:
                 self._end()
-            return done
-        speed = self.driver.find_speeds()[self.robot]
-        if self.driver.find_error()[self.robot] <= self.tolerance and speed <= self.slowness:
-            return elapsed > 0.0
-        self.stalled = elapsed >= self.patience
-        if self.stalled:
-            self._end()
-        return self.stalled
+        return not self._runs
+
+    def _has_arrived(self, robot: int) -> bool:
+        if self.driver.find_error(robot) > self.tolerance:
+            return False
+        return self.driver.find_speed(robot) <= self.slowness
 
     def describe(self) -> dict[str, Any]:
-        """What is being done, for recordings."""
-        return {"robot": self.robot, "action": self.action, "stalled": self.stalled}
+        """The turn, its owner and what it does, for recordings."""
+        if self.robot is None:
+            return {}
+        owner = self.world.scene.robots[self.robot].name
+        return {
+            **{"turn": self.turns, "owner": owner, "action": self.action},
+            "stalled": self.n_stalled,
+        }
 
     def _find_place(self) -> Array:
         return np.array(self.world.data.site_xpos[self.world.sites[self.robot]])
 
     def _end(self) -> None:
-        """The robot holds where it is."""
-        if self.robot is None:
-            return
-        self.world.apply_force(self.robot, np.zeros(3))
-        self.driver.targets[self.robot] = self._find_place()
-        self._pushes = False
+        """Ends what runs; a robot that was pushed or has stalled holds where it is."""
+        if self._runs and self.robot is not None:
+            if self._pushes:
+                self.world.apply_force(self.robot, np.zeros(3))
+            if self._pushes or self.stalled:
+                self.driver.targets[self.robot] = self._find_place()
+        self._runs = self._pushes = False

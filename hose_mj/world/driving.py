@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -112,18 +113,17 @@ class Driver:
         """Lets a robot's motors do nothing in the next step."""
         self.world.control[self._motors[robot].ids] = 0.0
 
-    def find_speeds(self) -> Array:
-        """How fast each robot's site moves along the axes it is driven in (N,), m/s."""
-        velocities = self.world.site_velocities()[:-1]
-        velocities[self.axes == 2, 2] = 0.0
-        return np.sqrt(np.einsum("ij,ij->i", velocities, velocities))
+    def find_error(self, robot: int) -> float:
+        """How far a robot's site is from its target, along the axes it is driven in (m)."""
+        axes, site = self.axes[robot], self.world.sites[robot]
+        return float(np.linalg.norm((self.world.data.site_xpos[site] - self.targets[robot])[:axes]))
 
-    def find_error(self) -> Array:
-        """How far each robot's site is from its target along the axes it is driven in (N,), m."""
-        data = self.world.data
-        error = data.site_xpos[self.world.sites[:-1]] - self.targets
-        error[self.axes == 2, 2] = 0.0
-        return np.sqrt(np.einsum("ij,ij->i", error, error))
+    def find_speed(self, robot: int) -> float:
+        """How fast a robot's site moves, along the axes it is driven in (m/s)."""
+        world = self.world
+        rows = np.zeros((3, world.model.nv))
+        mujoco.mj_jacSite(world.model, world.data, rows, None, int(world.sites[robot]))
+        return float(np.linalg.norm((rows @ world.data.qvel)[: self.axes[robot]]))
 
 
 def _refuse(world: World, motors: Motors) -> InputError:

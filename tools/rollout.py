@@ -91,14 +91,12 @@ class Rollout:
     def describe(self) -> str:
         """One line."""
         outcome = self.outcome
+        took = f"{outcome.steps:,} steps in {self.wall_s:.1f} s"
+        head = f"{self.world.hose_model}: {outcome.ended_by}"
         if outcome.broken is not None:
-            why = f"{outcome.broken.kind}: {outcome.broken.describe()}"
-        elif outcome.ended_by == "goal":
-            why = "the tip is at the goal"
-        else:
-            why = "the time is over; nothing broke and the tip is not at the goal"
-        ended = f"ended after {outcome.sim_time:.3f} s ({outcome.steps:,} steps)"
-        return f"{self.world.hose_model}: {ended} in {self.wall_s:.1f} s by {why}"
+            return f"{head} ({outcome.broken.kind}), {took}; {outcome.broken.describe()}"
+        end = "the tip is at the goal" if outcome.ended_by == "goal" else "nothing broke"
+        return f"{head} after {outcome.sim_time:.3f} s, {took}; {end}"
 
 
 class _Timed:

@@ -132,8 +132,12 @@ from unittest import mock
 from dm_control.viewer import application
 from hose_mj.envs.dm_world import load
 
-class Window(mock.MagicMock):
+class Window:
     shape = (320, 240)
+    def __init__(self, width, height, title):
+        self.mouse, self.keyboard = mock.MagicMock(), mock.MagicMock()
+    def close(self):
+        pass
     def event_loop(self, tick_func):
         for _ in range(3):
             pixels = tick_func()

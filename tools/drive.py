@@ -26,8 +26,9 @@ ARROWS = {265: (0, 1, 0), 264: (0, -1, 0), 263: (-1, 0, 0), 262: (1, 0, 0)}
 HEIGHT = {266: (0, 0, 1), 267: (0, 0, -1)}
 """GLFW's codes of the keys: arrows, page up and page down."""
 PICTURES_PER_SECOND = 50.0
-HELP = """keys: 0 to 9 choose a robot (0 is the tip's), arrows move it by a cell, page up and page down
-lift and lower one that flies, space stops all, backspace starts again; close the window to end"""
+HELP = """keys: 0 to 9 choose a robot (0 is the tip's), arrows move it by a cell,
+page up and page down lift and lower one that flies, space stops all,
+backspace starts again; close the window to end"""
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,7 @@ def run(args: Args) -> int:
     """Runs the episodes; 0 when done."""
     _check(args)
     scene = read_scene(find_scene(args.scene))
-    with Recording(args, len(args.model)) as recording:
+    with Recording(args, scene, len(args.model)) as recording:
         rollouts = [_roll_out(args, scene, model, recording) for model in args.model]
     records = [rollout.to_record(args) for rollout in rollouts]
     if args.json:

@@ -73,7 +73,7 @@ class SavedLearner:
     def _check_fit(self, world: World) -> None:
         settings = self._training.task.settings
         length = world.scene.spec.length / world.scene.cell_size
-        facts = {
+        facts: dict[str, tuple[Any, Any]] = {
             "robots": (world.n_robots, settings.n_robots),
             "cells along the hose": (round(length, 6), settings.hose_length),
         }

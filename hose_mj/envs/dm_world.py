@@ -1,9 +1,9 @@
 """A world as a dm_control environment, physics and task apart; dm_control's viewer opens it.
 
-    from dm_control import viewer
-    from hose_mj.envs.dm_world import load
+from dm_control import viewer
+from hose_mj.envs.dm_world import load
 
-    viewer.launch(load("floor_2"))
+viewer.launch(load("floor_2"))
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ N_POINTS = 33
 """Points along the hose in an observation."""
 
 
-class WorldPhysics(dm_mujoco.Physics):  # type: ignore[misc]
+class WorldPhysics(dm_mujoco.Physics):
     """A world behind dm_control's `Physics`: rendering, named access, `step`.
 
     `model` and `data` are copies for the eye: a scene's bodies and, where the hose is a spline, a
@@ -81,7 +81,9 @@ class WorldPhysics(dm_mujoco.Physics):  # type: ignore[misc]
             InputError: a keyframe.
         """
         if keyframe_id is not None:
-            raise InputError("keyframe_id", keyframe_id, "None: a world starts where its scene does")
+            raise InputError(
+                "keyframe_id", keyframe_id, "None: a world starts where its scene does"
+            )
         self.world.reset()
         self.monitor.reset()
         self.broken = None
@@ -137,7 +139,7 @@ class WorldPhysics(dm_mujoco.Physics):  # type: ignore[misc]
         mujoco.mj_forward(model, data)
 
 
-class WorldTask(control.Task):  # type: ignore[misc]
+class WorldTask(control.Task):
     """Brings the tip to the goal with raw controls of the motors, without a break.
 
     Observed are `positions` and `velocities` of the robots' sites and the source (N + 1, 3),

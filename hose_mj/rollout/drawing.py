@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from hose_mj.hoses.model import Array
 from hose_mj.recording.tension import color_tension
@@ -28,7 +29,7 @@ def draw_hose(scn: mujoco.MjvScene, world: World, limit: float, n_pieces: int = 
     arcs = np.linspace(0.0, world.scene.spec.length, n_pieces + 1)
     points = world.position(arcs)
     colors = color_pieces(world, arcs, limit)
-    n = min(n_pieces, scn.maxgeom - scn.ngeom)
+    n = int(min(n_pieces, scn.maxgeom - scn.ngeom))
     radius = world.scene.spec.radius
     for k in range(n):
         geom = scn.geoms[scn.ngeom + k]
@@ -38,7 +39,7 @@ def draw_hose(scn: mujoco.MjvScene, world: World, limit: float, n_pieces: int = 
     return n
 
 
-def color_pieces(world: World, arcs: Array, limit: float) -> Array:
+def color_pieces(world: World, arcs: Array, limit: float) -> npt.NDArray[np.float32]:
     """Red, green, blue, opacity from 0 to 1, float32 (k, 4), of the pieces between arc lengths."""
     middles = 0.5 * (arcs[1:] + arcs[:-1])
     colors = np.ones((len(middles), 4), np.float32)

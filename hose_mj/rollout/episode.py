@@ -13,6 +13,7 @@ from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.world.world import World
 
+Ending = Literal["break", "goal", "duration"]
 SAMPLE_RATE = 50.0
 """Samples per simulated second."""
 
@@ -73,7 +74,7 @@ class Outcome:
 
     steps: int
     sim_time: float
-    ended_by: Literal["break", "goal", "duration"]
+    ended_by: Ending
     broken: Break | None
     stalled: int
 
@@ -125,7 +126,8 @@ def run_episode(
         observer.start(world, monitor, settings or {})
     begun, steps, sampled = world.time, 0, 0
     most = max(1, round(duration / world.timestep))
-    broken, ended_by = None, None
+    broken: Break | None = None
+    ended_by: Ending | None = None
     _sample(observers, world, monitor, policy)
     while ended_by is None:
         policy.update()
@@ -149,9 +151,7 @@ def run_episode(
     return outcome
 
 
-def _sample(
-    observers: Sequence[Observer], world: World, monitor: Monitor, policy: Policy
-) -> None:
+def _sample(observers: Sequence[Observer], world: World, monitor: Monitor, policy: Policy) -> None:
     if observers:
         info = policy.describe()
         for observer in observers:

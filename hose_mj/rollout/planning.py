@@ -13,7 +13,6 @@ from hose_mj.rollout.obstacles import Obstacles, find_footprint
 from hose_mj.rollout.scripts import Script, relax
 from hose_mj.world.actions import find_cells, find_centres
 from hose_mj.world.driving import Driver
-from hose_mj.world.world import World
 
 Cell = tuple[int, int, int]
 HOSE_SAMPLES = 129
@@ -207,5 +206,7 @@ def _walk_back(before: dict[Cell, Cell], cell: Cell) -> list[Cell]:
     return path[::-1]
 
 
-_STEPS: list[Cell] = [(x, y, z) for x, y, z in product((-1, 0, 1), repeat=3) if (x, y, z) != (0, 0, 0)]
+_STEPS: list[Cell] = [
+    (x, y, z) for x, y, z in product((-1, 0, 1), repeat=3) if (x, y, z) != (0, 0, 0)
+]
 _LEVEL_STEPS = [step for step in _STEPS if step[2] == 0]

@@ -39,7 +39,8 @@ Cells = npt.NDArray[np.int64]
 def find_cells(world: World, points: Array) -> Cells:
     """c(P) = round((P - source) / cell size) of points (..., 3), m."""
     source = world.data.site_xpos[world.sites[-1]]
-    return np.round((points - source) / world.scene.cell_size).astype(np.int64)
+    cells: Cells = np.round((points - source) / world.scene.cell_size).astype(np.int64)
+    return cells
 
 
 def find_centres(world: World, cells: npt.ArrayLike) -> Array:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.model import Array
 from hose_mj.world.motors import Motors, find_motors
 from hose_mj.world.servos import ArmServo, SlideServo, find_axes, is_constant
 from hose_mj.world.wheels import WheelServo
@@ -134,5 +133,3 @@ def _refuse(world: World, motors: Motors) -> InputError:
     )
     robot = world.scene.robots[motors.robot]
     return InputError(f"motors of robot {robot.name}", names, valid)
-
-

@@ -34,7 +34,9 @@ def find_axes(world: World, motors: Motors) -> int:
     if np.linalg.matrix_rank(reach, _RANK * (1.0 + abs(reach).max(initial=0.0))) == 3:
         return 3
     plane = reach[:2]
-    return 2 if np.linalg.matrix_rank(plane, _RANK * (1.0 + abs(plane).max(initial=0.0))) == 2 else 0
+    return (
+        2 if np.linalg.matrix_rank(plane, _RANK * (1.0 + abs(plane).max(initial=0.0))) == 2 else 0
+    )
 
 
 def is_constant(world: World, motors: Motors) -> bool:
@@ -141,7 +143,8 @@ def _measure(world: World, motors: Motors, data: mujoco.MjData) -> tuple[Array, 
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
     own = np.flatnonzero(
-        model.body_rootid[model.dof_bodyid] == model.body_rootid[world.robot_bodies[motors.robot][0]]
+        model.body_rootid[model.dof_bodyid]
+        == model.body_rootid[world.robot_bodies[motors.robot][0]]
     )
     inverse = np.zeros_like(inertia)
     inverse[np.ix_(own, own)] = np.linalg.inv(inertia[np.ix_(own, own)])

@@ -132,9 +132,12 @@ def _find_radius(model: mujoco.MjModel, body: int) -> float:
     """Radius of the largest colliding round geom of a wheel (m); 0 without one."""
     first = int(model.body_geomadr[body])
     radii = [
-        float(model.geom_aabb[g, 3:].max() if model.geom_type[g] == _MESH else model.geom_size[g, 0])
+        float(
+            model.geom_aabb[g, 3:].max() if model.geom_type[g] == _MESH else model.geom_size[g, 0]
+        )
         for g in range(first, first + int(model.body_geomnum[body]))
-        if int(model.geom_type[g]) in _ROUND and (model.geom_contype[g] or model.geom_conaffinity[g])
+        if int(model.geom_type[g]) in _ROUND
+        and (model.geom_contype[g] or model.geom_conaffinity[g])
     ]
     return max(radii, default=0.0)
 

@@ -43,7 +43,7 @@ def test_the_break_comes_first(name, kind):
         with pytest.raises(InputError, match=IMPOSSIBLE[name, kind]):
             run(name, f"break-{kind}")
         return
-    world, outcome = run(name, f"break-{kind}")
+    _, outcome = run(name, f"break-{kind}")
     assert outcome.ended_by == "break"
     assert outcome.broken.kind == kind
     assert outcome.sim_time > 0.05  # not from the start
@@ -92,6 +92,6 @@ def test_the_tip_gets_to_the_goal(name):
 
 
 def test_names():
-    assert POLICIES == ("random", "to-goal", *(f"break-{kind}" for kind in KINDS))
+    assert ("random", "to-goal", *(f"break-{kind}" for kind in KINDS)) == POLICIES
     with pytest.raises(InputError, match="policy is 'nap'; valid: one of random, to-goal, break-s"):
         make_policy("nap")

@@ -92,10 +92,10 @@ def find_shortest(cells, start, goal):
                 beside = {(cell[0] + a, cell[1] + b, 0) for a in {0, dx} for b in {0, dy}}
                 beside -= {cell, goal}
                 total = cost + float(np.hypot(dx, dy))
-                if max(map(abs, following)) < 25 and total < best.get(following, np.inf):
-                    if all(cells.is_free(one) for one in beside):
-                        best[following] = total
-                        heapq.heappush(queue, (total, following))
+                is_better = max(map(abs, following)) < 25 and total < best.get(following, np.inf)
+                if is_better and all(cells.is_free(one) for one in beside):
+                    best[following] = total
+                    heapq.heappush(queue, (total, following))
     return None
 
 

@@ -57,9 +57,7 @@ def test_the_duration_and_the_goal(capsys):
 
 def test_a_recording_is_written(capsys, tmp_path):
     path = tmp_path / "break.rrd"
-    status, out, _ = run(
-        capsys, "floor_2", "--policy", "break-stretch", "--save", path, "--json"
-    )
+    status, out, _ = run(capsys, "floor_2", "--policy", "break-stretch", "--save", path, "--json")
     assert status == 0
     assert json.loads(out)["recording"] == str(path)
     assert path.stat().st_size > 10_000

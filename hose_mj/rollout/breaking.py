@@ -131,9 +131,9 @@ def _list_ways(driver: Driver, robot: int, step: Array) -> list[tuple[float, Scr
     alone = move(world, robot, {robot: sites[robot] + step})
     spans = -np.diff(world.arc_lengths)
     ways = [(distance, alone)]
-    for cost, slack in ((1.2, 0.9), (2.0, 0.75)):
+    for cost, slack, pace in ((1.2, 0.9, 1.0), (2.0, 0.75, 1.0), (2.5, 0.9, 0.5)):
         together = relax(alone.formations[0], robot, sites[-1], slack * spans)
-        ways.append((cost * distance, Script(robot, together[None])))
+        ways.append((cost * distance, Script(robot, together[None], pace)))
     return ways
 
 

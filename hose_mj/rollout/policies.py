@@ -118,6 +118,10 @@ class Breaking:
         """
         if self.kind not in monitor.kinds:
             raise InputError("policy", f"break-{self.kind}", _WANTED[self.kind])
+        broken = monitor.reset()
+        if broken is not None:
+            valid = f"a start that breaks nothing ({broken.describe()})"
+            raise InputError("policy", f"break-{self.kind}", valid)
         driver = Driver(world)
         rehearsal = Rehearsal(world, monitor, ends_at_goal=False)
         found, trials = rehearsal.find(LISTS[self.kind](driver), self._is_wanted)

@@ -21,8 +21,8 @@ from hose_mj.world.world import World
 
 SLOW_MODELS = ("cable", "flex")
 MOST_TRIALS = 24
-LONGEST = 5.0
-"""Simulated time of a trial at most (s)."""
+LONGEST, LONGEST_OF_ALL = 5.0, 30.0
+"""Simulated time of a trial, and of all, at most (s)."""
 PATIENCE = 1.5
 """How much longer than its targets take a trial goes on, and a second more."""
 
@@ -66,7 +66,8 @@ class Rehearsal:
         """Returns the first trial that is as wanted, None if none is, and all trials made."""
         trials: list[Trial] = []
         for script in scripts:
-            if len(trials) == MOST_TRIALS:
+            spent = sum(trial.time for trial in trials)
+            if len(trials) == MOST_TRIALS or spent > LONGEST_OF_ALL:
                 break
             trial = self._play(script)
             trials.append(trial)

@@ -75,7 +75,7 @@ def test_random_robots_take_turns_from_cell_to_cell():
         world.step()
     assert [turn for turn, _, _ in seen] == list(range(1, len(seen) + 1))
     assert [owner for _, owner, _ in seen] == [f"robot{k % 2}" for k in range(len(seen))]
-    assert len(seen) > 6
+    assert len(seen) >= 4
     assert {action for _, _, action in seen} <= {"up", "down", "left", "right"}
 
 

@@ -6,7 +6,10 @@ import json
 
 import pytest
 
+from learning.study.run_folder import RunFolder
+from learning.study.training import join
 from tools import cli
+from tools.train import Args, make_training
 
 FIELDS = {
     "model": str,
@@ -86,14 +89,16 @@ def test_bad_input_is_one_line_and_status_2(capsys, words, what):
     assert err.count("\n") == 1
 
 
-def train(capsys, path, *words):
-    defaults = ["--episodes", "300", "--tests", "1", "--json", "--out", str(path)]
-    assert cli.main(["train", *words, *defaults]) == 0
-    capsys.readouterr()
+def make_run(path, task, *options):
+    """A run that has not trained yet: its learner chooses among equals, by its stream."""
+    training = make_training(Args(task=task, set=options, episodes=10))
+    folder = RunFolder(path)
+    folder.create(training, seed=0)
+    folder.save(training, join([]))
 
 
 def test_a_saved_learner_acts(capsys, tmp_path):
-    train(capsys, tmp_path / "run", "line", "--set", "n_robots=2")
+    make_run(tmp_path / "run", "line", "n_robots=2")
     documents = []
     for _ in range(2):
         status, out, _ = run(
@@ -112,7 +117,7 @@ def test_a_saved_learner_acts(capsys, tmp_path):
 
 
 def test_a_learner_of_something_else_is_refused(capsys, tmp_path):
-    train(capsys, tmp_path / "run", "corridor")
+    make_run(tmp_path / "run", "corridor")
     status, _, err = run(capsys, "floor_2", "--policy", tmp_path / "run")
     assert status == 2
     assert "task of the run is 'corridor'; valid: line" in err

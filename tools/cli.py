@@ -41,6 +41,7 @@ COMMANDS = {
     "consensus": Command("tools.consensus", "let agents agree on whose turn it is, by messages"),
     "curves": Command("tools.learning_curves", "draw how learners get better as they train"),
     "doctor": Command("tools.doctor", "check that this installation has what hose_mj needs"),
+    "drive": Command("tools.drive", "drive the robots of a scene with the keyboard"),
     "joint-policy": Command(
         "tools.joint_policy", "compose what agents learned in turns into joint moves"
     ),
@@ -50,6 +51,7 @@ COMMANDS = {
     "reproduce": Command(
         "tools.reproduce", "repeat the thesis's experiments over seeds, beside its numbers"
     ),
+    "rollout": Command("tools.rollout", "run an episode of a policy in a scene with a hose"),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
     "transfer": Command("tools.transfer", "start on a task from what was learned on a simpler one"),
 }

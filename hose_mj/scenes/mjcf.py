@@ -26,7 +26,10 @@ GOAL = "goal"
 ATTACHMENTS = "hose_attachments"
 FRICTION = "hose_friction"
 BOUNDS = "bounds"
+CELL_SIZE = "cell_size"
 DEFAULT_FRICTION = 0.3
+CELLS_ALONG_HOSE = 16
+"""Cells that the hose is long where the scene does not say how wide a cell is (thesis B.2)."""
 _NUMERICS = (*HOSE_NUMERICS, ATTACHMENTS, FRICTION)
 _ROUNDING = 1e-9
 
@@ -47,6 +50,7 @@ class Scene:
         bounds: lowest and highest x, y, z for the robots (m); infinite where there is no bound.
         friction: Coulomb friction coefficient between the hose and the scene.
         timestep: MuJoCo's step (s).
+        cell_size: width of the square cells around the source in which robots move (m).
     """
 
     path: Path
@@ -58,6 +62,7 @@ class Scene:
     bounds: tuple[Vector, Vector]
     friction: float
     timestep: float
+    cell_size: float
 
     def make_spec(self) -> Any:
         """Returns the scene as a new `mujoco.MjSpec`, to be extended by a hose and compiled.
@@ -129,6 +134,7 @@ def read_scene(path: str | Path) -> Scene:
         bounds=bounds,
         friction=float(friction[0]),
         timestep=facts["timestep"],
+        cell_size=_read_cell_size(numerics.get(CELL_SIZE), spec.length, file),
     )
 
 
@@ -159,6 +165,15 @@ def _check_distance(file: str, place: Place, other: Place, most: float, what: st
     if not distance <= most + _ROUNDING:
         thing = f"{file}: distance of {SITE} {place.site}"
         raise InputError(thing, round(distance, 6), f"at most {most:g} m {what}")
+
+
+def _read_cell_size(data: Sequence[float] | None, length: float, file: str) -> float:
+    if data is None:
+        return length / CELLS_ALONG_HOSE
+    if len(data) != 1 or not 0.0 < data[0] <= length:
+        valid = f"one number above 0, at most the hose's length {length:g} (m)"
+        raise InputError(f"{file}: numeric {CELL_SIZE}", tuple(data[:4]), valid)
+    return float(data[0])
 
 
 def _read_bounds(data: Sequence[float] | None, file: str) -> tuple[Vector, Vector]:

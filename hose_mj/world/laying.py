@@ -17,6 +17,8 @@ N_POINTS = 257
 """Points of a start shape."""
 _DRAG = 4.0
 """Drag over linear density while the hose comes to rest (1/s)."""
+_NEAR = 4
+"""Points on either side of an attachment that may be near each other."""
 _STEP, _DURATION = 0.004, 4.0
 _MOST_WAVES = 6
 """Half waves between neighbours at most."""
@@ -37,9 +39,9 @@ def relax_hose(
 ) -> GedsHose:
     """Returns a hose at rest that is held at its attachments and lies on what is below it.
 
-    Between neighbours it starts as an arc of a circle or as waves to the side, or hanging, the
-    first of these that is clear of all obstacles or the one that is clearest. Then it moves through
-    a viscous medium until it has found its place. All hose models start from this shape.
+    Between neighbours it starts as an arc of a circle or as waves to the side, or hanging: clear of
+    obstacles, without crossing itself, without a kink, in this order, as far as there is such a
+    shape. Then it moves through a viscous medium until it has found its place. All hose models start from this shape.
 
     Args:
         spec: the hose.
@@ -99,12 +101,29 @@ def _draw(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
             for bulge in (side, -side)
         ]
         choices += [_draw_arc(place, chord, end - s, parts, bulge) for bulge in (down, -down)]
-        clear = [_find_clearance(hose, even[mine], choice) for choice in choices]
-        points[mine] = choices[int(np.argmax(clear))]
+        earlier = points[even < s]
+        costs = [_judge(hose, even[mine], choice, earlier) for choice in choices]
+        points[mine] = choices[int(np.argmin(costs))]
         last = direction
     beyond = even > arc_lengths[-1]
     points[beyond] = places[-1] + (even[beyond] - arc_lengths[-1])[:, None] * last
     return points
+
+
+def _judge(hose: GedsHose, arc_lengths: Array, points: Array, earlier: Array) -> float:
+    """How little points (k, 3), m, suit as the next part of a hose after points before (j, 3).
+
+    What it would stand in counts most, what it would cross of itself next, last the kink.
+    """
+    radius = hose.spec.radius
+    cost = 1e3 * (0.99 * radius - _find_clearance(hose, arc_lengths, points)) / radius
+    if len(earlier) < 2:
+        return cost
+    apart = np.linalg.norm(points[None, _NEAR:] - earlier[:-_NEAR, None], axis=2)
+    if apart.min(initial=np.inf) < 2.0 * radius:
+        cost += 10.0
+    before, after = earlier[-1] - earlier[-2], points[1] - points[0]
+    return cost - float(before @ after) / float(np.linalg.norm(before) * np.linalg.norm(after))
 
 
 def _find_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:

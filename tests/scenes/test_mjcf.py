@@ -85,6 +85,7 @@ def test_a_scene_is_read(write):
     )
     assert (scene.friction, scene.timestep) == (0.3, 0.002)
     assert scene.bounds == ((-math.inf,) * 3, (math.inf,) * 3)
+    assert scene.cell_size == 2.0 / 16
     assert scene.make_spec().compile().nu == 0
 
 
@@ -110,12 +111,12 @@ def test_a_section_and_a_material_make_the_hose(write):
 
 def test_prefixes_bounds_friction_and_attachments(write):
     custom = """<numeric name="bounds" data="-3 -2 3 2"/><numeric name="hose_friction" data="0.6"/>
-      <numeric name="hose_attachments" data="1.9 0.95"/>"""
+      <numeric name="hose_attachments" data="1.9 0.95"/><numeric name="cell_size" data="0.2"/>"""
     text = make_scene(custom=custom, sites=SITES.replace("goal", "arena/goal"))
     scene = read_scene(write(text.replace('"hose_source', '"arena/hose_source')))
     assert (scene.goal.site, scene.source.site) == ("arena/goal", "arena/hose_source")
     assert scene.bounds == ((-3.0, -2.0, -math.inf), (3.0, 2.0, math.inf))
-    assert scene.friction == 0.6
+    assert (scene.friction, scene.cell_size) == (0.6, 0.2)
     assert [r.arc_length for r in scene.robots] == [1.9, 0.95]
     space = custom.replace("-3 -2 3 2", "-3 -2 0 3 2 1")
     assert read_scene(write(make_scene(custom=space))).bounds == ((-3, -2, 0), (3, 2, 1))
@@ -222,6 +223,9 @@ MISTAKES = [
         make_scene(custom=number("bounds", "-1 -1 1 1")),
         "position of site r0/hose_attach is (1.8, 0.0, 0.0); valid: within the bounds, (-1.0, ",
     ),
+    (make_scene(custom=number("cell_size", 0)), "numeric cell_size is (0.0,); valid: one number"),
+    (make_scene(custom=number("cell_size", 2.1)), "cell_size is (2.1,); valid: one number above 0"),
+    (make_scene(custom=number("cell_size", "1 1")), "numeric cell_size is (1.0, 1.0); valid: one"),
     (make_scene(custom=number("hose_attachments", "1 2")), "numeric hose_attachments is (1.0, 2."),
     (make_scene(custom=number("hose_attachments", "1")), "hose_attachments is (1.0,); valid: 2 nu"),
     (make_scene(custom=number("hose_lenght", 1)), "numeric is 'hose_lenght'; valid: one of hose_l"),

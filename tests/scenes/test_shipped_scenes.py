@@ -64,6 +64,7 @@ def test_the_floor_is_the_line_tasks(scenes, n):
     scene = scenes[f"floor_{n}"]
     assert len(scene.robots) == n
     assert scene.spec.length == pytest.approx(16 * CELL)
+    assert scene.cell_size == pytest.approx(CELL)
     low, high = scene.bounds
     assert [b - a for a, b in zip(low[:2], high[:2], strict=True)] == pytest.approx([1.05, 1.05])
     assert scene.source.position[:2] == (0.0, 0.0)

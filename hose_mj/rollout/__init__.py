@@ -1,0 +1,1 @@
+"""Episodes in worlds: policies that act in them, and what watches."""

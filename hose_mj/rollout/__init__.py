@@ -1,0 +1,1 @@
+"""Episodes in a world: driven, watched, recorded."""

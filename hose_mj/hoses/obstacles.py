@@ -31,6 +31,8 @@ class Obstacle:
         friction: Coulomb's coefficient against the hose.
         velocity: of its position (3,), m/s; friction follows the surface.
         angular_velocity: (3,), rad/s.
+        skips: arc lengths between which the hose does not touch it, lowest first (m); by default
+            none. The hose where a robot holds it does not touch that robot.
 
     Raises:
         InputError: an unknown kind, a size that is missing or not above zero, a rotation that is
@@ -44,6 +46,7 @@ class Obstacle:
     friction: float = 0.5
     velocity: ArrayLike = _ZERO
     angular_velocity: ArrayLike = _ZERO
+    skips: tuple[float, float] = (np.inf, -np.inf)
 
     def __post_init__(self) -> None:
         check_choice("kind of obstacle", self.kind, list(KINDS))

@@ -40,6 +40,7 @@ class World(ABC):
         robot_bodies: ids of each robot's bodies: those under the same child of the world as its
             site.
         control: inputs of the scene's actuators (nu,), kept from step to step; written to.
+        robot_forces: what `apply_force` has set, (N, 3), N.
     """
 
     hose_model: str
@@ -53,7 +54,7 @@ class World(ABC):
         roots = model.body_rootid[model.site_bodyid[self.sites[:-1]]]
         self.robot_bodies = [np.flatnonzero(model.body_rootid == root) for root in roots]
         self.control = np.zeros(model.nu)
-        self._forces = np.zeros((len(scene.robots), 3))
+        self.robot_forces = np.zeros((len(scene.robots), 3))
 
     # -- what each kind of world says for itself ---------------------------------------------------
 
@@ -143,7 +144,7 @@ class World(ABC):
         """
         if check_count("robot", robot, 0) >= self.n_robots:
             raise InputError("robot", robot, f"0 (tip) to {self.n_robots - 1}")
-        self._forces[robot] = check_vector("force", force)
+        self.robot_forces[robot] = check_vector("force", force)
 
     # -- state -------------------------------------------------------------------------------------
 
@@ -154,7 +155,7 @@ class World(ABC):
         return {
             "mujoco": state,
             "control": self.control.copy(),
-            "forces": self._forces.copy(),
+            "forces": self.robot_forces.copy(),
             "hose": self.hose_snapshot(),
         }
 
@@ -168,7 +169,7 @@ class World(ABC):
         if state["mujoco"].shape != (size,):
             raise InputError("size of the state", state["mujoco"].shape, "a snapshot of this world")
         mujoco.mj_setState(self.model, self.data, state["mujoco"], _STATE)
-        self.control[:], self._forces[:] = state["control"], state["forces"]
+        self.control[:], self.robot_forces[:] = state["control"], state["forces"]
         self.restore_hose(state["hose"])
         self._update_poses()
 
@@ -181,7 +182,7 @@ class World(ABC):
             mujoco.mj_resetDataKeyframe(self.model, self.data, key)
         else:
             mujoco.mj_resetData(self.model, self.data)
-        self.control[:], self._forces[:] = 0.0, 0.0
+        self.control[:], self.robot_forces[:] = 0.0, 0.0
         self._update_poses()
 
     def _update_poses(self) -> None:
@@ -193,8 +194,8 @@ class World(ABC):
         """Hands controls and the user's forces to MuJoCo."""
         self.data.ctrl[:] = self.control
         self.data.qfrc_applied[:] = 0.0
-        if np.any(self._forces):
-            for site, force in zip(self.sites, self._forces, strict=False):
+        if np.any(self.robot_forces):
+            for site, force in zip(self.sites, self.robot_forces, strict=False):
                 body, point = self.model.site_bodyid[site], self.data.site_xpos[site]
                 mujoco.mj_applyFT(
                     *(self.model, self.data, force, np.zeros(3), point),

@@ -53,6 +53,7 @@ class Capsules:
         turn = np.cross(axes, np.diff(speeds, axis=0)) / lengths
         rows[:, shapes.SPIN : shapes.SPIN + 3] = turn
         rows[:, shapes.SCALE] = scale
+        rows[:, shapes.SKIP_FROM], rows[:, shapes.SKIP_TO] = np.inf, -np.inf
         return rows
 
 

@@ -20,6 +20,7 @@ from hose_mj.hoses.geds.contact_law import (
     compute_force,
     evaluate,
     find_gap,
+    is_skipped,
     is_span_near,
 )
 from hose_mj.hoses.geds.shapes import POSITION, SCALE
@@ -58,6 +59,8 @@ def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):  # t
             if not is_span_near(axes, contact, e, g, x):
                 continue
             for q in range(e * per_span, (e + 1) * per_span):
+                if is_skipped(contact, q, g):
+                    continue
                 gap, normal, bend, friction, surface = find_gap(axes, contact, q, g, start, x)
                 if gap >= contact.law[WIDTH]:
                     continue
@@ -176,6 +179,8 @@ def compute_forces(axes, contact, x, v, forces, reactions):  # type: ignore[no-u
             if not is_span_near(axes, contact, e, g, x):
                 continue
             for q in range(e * per_span, (e + 1) * per_span):
+                if is_skipped(contact, q, g):
+                    continue
                 gap, normal, _, friction, surface = find_gap(axes, contact, q, g, start, x)
                 velocity = evaluate(axes, contact.points, q, start, v)
                 relative = _relate(velocity, surface)

@@ -15,7 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.compiled import kernel
-from hose_mj.hoses.geds.shapes import FRICTION, POSITION, SPIN, VELOCITY, is_near, measure
+from hose_mj.hoses.geds.shapes import (
+    FRICTION,
+    POSITION,
+    SKIP_FROM,
+    SKIP_TO,
+    SPIN,
+    VELOCITY,
+    is_near,
+    measure,
+)
 from hose_mj.hoses.model import Array
 
 STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE, SELF_STIFFNESS, SELF_DAMPING, ROUND = range(9)
@@ -32,7 +41,7 @@ class Contact(NamedTuple):
     Attributes:
         points: the four basis functions at each contact point and its share of arc length (m),
             (Q, 5), span after span, equally many in each.
-        geoms: one row a shape, see shapes.py, (G, 25).
+        geoms: one row a shape, see shapes.py, (G, ROW).
         given: distances handed in, one row a contact point, (Q, 11); (0, 11) for none.
         law: numbers of the contact law, (9,); no self-contact where its stiffness is 0.
         arcs: rest arc lengths of the contact points, (Q,), m.
@@ -145,6 +154,14 @@ def find_gap(axes, contact, q, g, start, x):  # type: ignore[no-untyped-def]
     surface = _find_surface_velocity(geoms, g, foot)
     gap = distance - contact.law[RADIUS]
     return gap, normal, (bend, axis), geoms[g, FRICTION], surface
+
+
+@kernel
+def is_skipped(contact, q, g):  # type: ignore[no-untyped-def]
+    """Whether contact point q is on the part of the hose that does not touch geom g."""
+    if g < 0:
+        return False
+    return contact.geoms[g, SKIP_FROM] <= contact.arcs[q] <= contact.geoms[g, SKIP_TO]
 
 
 @kernel

@@ -15,7 +15,7 @@ from hose_mj.hoses.geds import basis, contact, contact_law, shapes
 from hose_mj.hoses.geds.capsules import Capsules
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.model import Array, Reaction
+from hose_mj.hoses.model import Array
 from hose_mj.hoses.obstacles import MOST_POINTS, SINK, ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
 
@@ -129,14 +129,46 @@ class ContactSet:
 
     def rebuild(self) -> None:
         """Makes what the kernels read; to be called where the plane of the hose has moved."""
-        geoms = np.zeros((len(self.obstacles), shapes.ROW))
-        for row, obstacle in zip(geoms, self.obstacles, strict=True):
-            row[:] = self._make_row(obstacle)
-        geoms = np.concatenate([geoms, self._capsules])
+        geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
         room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
         self.contact = contact_law.Contact(
             self._points, geoms, self._given, self._numbers, self.arc_lengths, room
         )
+
+    def make_shapes(self, obstacles: Sequence[Obstacle]) -> Array:
+        """Returns obstacles as kernels read them, rows of shapes.py, (G, ROW)."""
+        rows = np.zeros((len(obstacles), shapes.ROW))
+        for row, obstacle in zip(rows, obstacles, strict=True):
+            row[:] = self._make_row(obstacle)
+        return rows
+
+    def measure(self, points: Array) -> Array:
+        """Signed distances of points (k, 3), m, world frame, from the obstacles, (G, k), m."""
+        local = np.ascontiguousarray((points - self._spline.offset)[:, self.order])
+        found = np.zeros((len(self.obstacles), len(points)))
+        normals = np.zeros_like(local)
+        for g, row in enumerate(found):
+            shapes.measure_points(self.contact.geoms, g, local, row, normals)
+        return found
+
+    def place(self, numbers: np.ndarray, positions: Array, rotations: Array, twists: Array) -> None:
+        """Moves some obstacles (k,) at once, without checks; `obstacles` keeps what was set.
+
+        Args:
+            numbers: of the obstacles.
+            positions: (k, 3), m.
+            rotations: (k, 3, 3).
+            twists: velocities and angular velocities, (k, 6), m/s, rad/s.
+        """
+        rows, order, k = self.contact.geoms, self.order, len(numbers)
+        at = shapes.POSITION
+        rows[numbers, at : at + 3] = (positions - self._spline.offset)[:, order]
+        at = shapes.ROTATION
+        rows[numbers, at : at + 9] = rotations[:, order].reshape(k, 9)
+        at = shapes.VELOCITY
+        rows[numbers, at : at + 3] = twists[:, order]
+        at = shapes.SPIN
+        rows[numbers, at : at + 3] = self._parity * twists[:, 3:][:, order]
 
     # -- forces ----------------------------------------------------------------------------------
 
@@ -153,12 +185,21 @@ class ContactSet:
         """Returns the forces on the hose at the contact points (Q, 3), N, world frame."""
         return self._to_world(self.compute_forces(x, v)[0])
 
-    def compute_reactions(self, x: Array, v: Array) -> list[Reaction]:
-        """Returns what the hose does to each obstacle, moments about the obstacle's position."""
+    def compute_given_forces(self, x: Array, v: Array) -> Array:
+        """Returns the forces on the hose of the distances handed in (Q, 3), N, world frame."""
+        forces = np.zeros((len(self._points), 3))
+        alone = self.contact._replace(geoms=np.zeros((0, shapes.ROW)))
+        run_kernel(
+            *(contact.compute_forces, self._spline.axes, alone, x, v, forces, np.zeros((0, 6)))
+        )
+        return self._to_world(forces)
+
+    def compute_reactions(self, x: Array, v: Array) -> Array:
+        """Returns what the hose does to each obstacle, (G, 6): force (N), moment (N m) about it."""
         found = self.compute_forces(x, v)[1][: len(self.obstacles)]
         forces = self._to_world(found[:, :3])
         moments = self._parity * self._to_world(found[:, 3:])
-        return [Reaction(f, m) for f, m in zip(forces, moments, strict=True)]
+        return np.concatenate([forces, moments], axis=1)
 
     def compute_capsule_forces(self, x: Array, v: Array) -> Array:
         """Returns what the hose does to the ends of the capsules, (m + 1, 3), N, world frame.
@@ -247,6 +288,7 @@ class ContactSet:
         spin = self._parity * np.asarray(obstacle.angular_velocity)[order]
         row[shapes.SPIN : shapes.SPIN + 3] = spin
         row[shapes.SCALE] = 1.0
+        row[shapes.SKIP_FROM], row[shapes.SKIP_TO] = obstacle.skips
         return row
 
     def _to_world(self, rows: Array) -> Array:

@@ -10,6 +10,7 @@ them (loops.py).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +61,7 @@ class HoldSet:
         self._spline, self._hose = spline, hose
         self.is_closed = False
         self._held: list[_Held] = []
+        self._giving: list[Hold] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
         self._n_made = 0
         x = np.zeros(spline.size)
@@ -74,6 +76,10 @@ class HoldSet:
     def is_free(self) -> bool:
         """True where nothing holds the hose in space."""
         return not self._held
+
+    def list_all(self) -> list[Hold]:
+        """All holds, the oldest first."""
+        return [held.hold for held in self._held]
 
     def clear(self, x: Array, director: Array | None = None) -> None:
         """Drops all holds and opens a loop; numbers are not used again. The frames begin anew.
@@ -201,6 +207,58 @@ class HoldSet:
             # Nothing else knows the angle of a hose without theta.
             stretches.turn_director(twist, clamp, angle)
 
+    def give_way(
+        self,
+        holds: Sequence[Hold],
+        positions: ArrayLike | None = None,
+        compliance: ArrayLike | None = None,
+    ) -> np.ndarray:
+        """Lets attachments yield to the hose within the next step, see `Carried.try_step`.
+
+        Returns:
+            the first row of each, (k,). Without positions that is all it does.
+
+        Raises:
+            InputError: a clamp, a hold that is not here, wrong shapes, numbers that are not finite.
+        """
+        if list(holds) != self._giving:
+            for hold in holds:
+                if self._find(hold).tangent is not None:
+                    raise InputError("hold", hold, "an attachment: a clamp on a body gives no way")
+            self._giving = list(holds)
+            self._giving_first = np.array([self._find(h).first for h in holds], dtype=np.int64)
+            d = self._spline.dimension
+            self._giving_rows = (self._giving_first[:, None] + np.arange(d)).ravel()
+            self.rows = self.rows._replace(response=solver.make_response(len(self.rows.start)))
+        if positions is not None:
+            k, dims = len(holds), self._spline.dims
+            places, matrix = np.asarray(positions, float), np.asarray(compliance, float)
+            if places.shape != (k, 3) or matrix.shape != (3 * k, 3 * k):
+                valid = f"({k}, 3) and ({3 * k}, {3 * k})"
+                shapes = (places.shape, matrix.shape)
+                raise InputError("shapes of positions and compliance", shapes, valid)
+            if not (np.isfinite(places).all() and np.isfinite(matrix).all()):
+                raise InputError("positions and compliance", places.tolist(), "finite numbers")
+            kept = (3 * np.arange(k)[:, None] + dims).ravel()
+            rows = self._giving_rows
+            self.rows.after[rows] = (places - self._spline.offset)[:, dims].ravel()
+            self.rows.response.compliance[rows[:, None], rows] = matrix[kept[:, None], kept]
+        return self._giving_first
+
+    def find_mean_forces(self) -> Array:
+        """Mean forces over the last step of the holds that give way, (k, 3), N, world frame."""
+        forces = np.zeros((len(self._giving), 3))
+        if not self._giving:
+            return forces
+        found = self.rows.response.force[self._giving_rows]
+        forces[:, self._spline.dims] = found.reshape(len(forces), -1)
+        return forces
+
+    def find_positions(self, x: Array) -> Array:
+        """Where unknowns x put the holds that give way, (k, 3), m, world frame."""
+        places = np.array([hold.arc_length for hold in self._giving])
+        return self._spline.evaluate(places, x) + self._spline.offset
+
     def release(self, hold: Hold, x: Array) -> None:
         """Drops one hold; raises `InputError` for one that is not here."""
         self._held.remove(self._find(hold))
@@ -275,6 +333,8 @@ class HoldSet:
             "is_closed": self.is_closed,
             "before": before,
             "twist": twist,
+            "giving": [hold.number for hold in self._giving],
+            "mean_force": self.rows.response.force.copy(),
         }
 
     def restore(self, state: dict[str, Any], x: Array) -> None:
@@ -295,6 +355,10 @@ class HoldSet:
         for name in _REMEMBERED:
             getattr(self.rows.twist, name)[:] = state["twist"][name]
         self.rows.twist.frames[:] = self.rows.twist.kept
+        if state["giving"]:
+            numbers = {one.hold.number: one.hold for one in self._held}
+            self.give_way([numbers[number] for number in state["giving"]])
+            self.rows.response.force[:] = state["mean_force"]
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -372,7 +436,9 @@ class HoldSet:
             coefficients[first:] = loops.make_joint_rows(self._spline)
             before[first:] = coefficients[first:, :width] @ x[:width]
             before[first:] += coefficients[first:, width:] @ x[-width:]
-        return solver.Holds(start, coefficients, before, after, multipliers, twist)
+        self._giving = []
+        response = solver.make_response(0)
+        return solver.Holds(start, coefficients, before, after, multipliers, twist, response)
 
     def _aim(self, held: _Held, x: Array) -> None:
         """What `_rebuild` does for a hold of which only the position has changed."""

@@ -16,6 +16,7 @@ from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds import mechanics, schemes, solver, statics
 from hose_mj.hoses.geds.body import SplineBody
+from hose_mj.hoses.geds.carried import Carried
 from hose_mj.hoses.geds.contact_set import ContactSet
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
@@ -29,11 +30,11 @@ _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
 
 
-class GedsHose(Touching, SplineBody):
+class GedsHose(Carried, Touching, SplineBody):
     """Geometrically Exact Dynamic Splines (thesis appendix A) with an implicit integrator.
 
     Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact
-    forces those of `Touching`.
+    forces those of `Touching`, steps with bodies that feel the hose those of `Carried`.
 
     Args:
         spec: the hose.
@@ -226,6 +227,11 @@ class GedsHose(Touching, SplineBody):
         """
         self._holds.move(hold, position, tangent, spin, self._state.x)
 
+    @property
+    def holds(self) -> list[Hold]:
+        """All clamps and attachments, the oldest first."""
+        return self._holds.list_all()
+
     def release(self, hold: Hold) -> None:
         """Lets go; raises `InputError` for a hold that was released before."""
         self._holds.release(hold, self._state.x)
@@ -301,11 +307,7 @@ class GedsHose(Touching, SplineBody):
         self._steps += int(counts[schemes.STEPS])
         self.iterations += int(counts[schemes.ITERATIONS])
         self.fallbacks += int(counts[schemes.FALLBACKS])
-        if verdict != solver.DONE:
-            raise StepError(
-                f"the step at t = {self.time:.6g} s failed: {solver.VERDICTS[verdict]}; "
-                f"try a time step below {self._timestep:g} s or check holds and loads"
-            )
+        self._check(verdict)
 
     def solve_static(self, load_steps: int = 1) -> None:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.

@@ -26,6 +26,7 @@ from hose_mj.hoses.geds.solver import (
     newton,
     solve_with_holds,
 )
+from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.twist import accept_twist, start_twist
 from hose_mj.hoses.model import Array
 
@@ -103,6 +104,32 @@ def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-de
     return h, fraction
 
 
+@inlined
+def _set_up_response(holds, scheme, stage, part, parts):  # type: ignore[no-untyped-def]
+    """Writes what a stage knows of the mean force over the step: base + share lambda.
+
+    BDF2's share carries on a third of the force before, so that its impulses are those that change
+    the hose's momentum. Where a step is taken in parts, each takes its force for that of the rest.
+    """
+    response = holds.response
+    share = 1.0
+    if scheme == _BDF2:
+        share = 2.0 / 3.0
+    elif scheme == _SDIRK2 and stage == 1:
+        share = _GAMMA
+    else:
+        share = (parts - part) / parts
+    response.share[0] = share
+    for row in range(len(response.compliance)):
+        if scheme == _BDF2:
+            base = response.force[row] / 3.0
+        elif scheme == _SDIRK2:
+            base = (1.0 - _GAMMA) * response.gathered[row]
+        else:
+            base = response.gathered[row] / parts
+        response.base[row] = base
+
+
 @merged
 def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, counts):  # type: ignore[no-untyped-def]
     """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
@@ -115,10 +142,14 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
         work.v_now[k] = state.v[k]
     n_stages = 2 if scheme == _SDIRK2 else 1
     h = dt
+    response = holds.response
+    for row in range(len(response.compliance)):
+        response.gathered[row] = 0.0
     for part in range(parts):
         for stage in range(n_stages):
             h, end = _set_up_stage(scheme, stage, dt / parts, state, work)
             fraction = (part + end) / parts
+            _set_up_response(holds, scheme, stage, part, parts)
             verdict, iterations, fallbacks = newton(
                 axes, hose, (h, work.X, work.V), holds, fraction, loads, 1.0, limits, work.x, work
             )
@@ -126,6 +157,8 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
             counts[FALLBACKS] += fallbacks
             if verdict != DONE:
                 return verdict, h
+            for row in range(len(response.compliance)):
+                response.gathered[row] += work.multipliers[row]
         for k in range(size):
             v = (work.x[k] - work.X[k]) / h
             if scheme == _MIDPOINT:
@@ -235,7 +268,7 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
                 work.band[k, m] = 0.0
         add_mass(axes, hose, 1.0, work.band)
         factorize(axes, size, work.band)
-        verdict = solve_with_holds(axes, holds, _NO_CHANGE, 0, size, work)
+        verdict = solve_with_holds(axes, holds, 0.0, _NO_CHANGE, 0, size, work)
         if verdict != DONE:
             return verdict
         for k in range(size):
@@ -255,8 +288,8 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
 
 
 @kernel
-def _take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
-    """Takes one step, but for what ends it with the twist; returns a verdict.
+def take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
+    """Takes one step, but for what `end_step` does; returns a verdict.
 
     It allocates nothing, so numba counts no references to the arrays in its records: to count them
     would cost a short hose nearly as much as the step itself.
@@ -269,8 +302,22 @@ def _take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts
         counts[STEPS] += 1
         for row in range(len(holds.start)):
             holds.multipliers[row] = work.multipliers[row]
-            holds.before[row] = holds.after[row]
+        response = holds.response
+        for row in range(len(response.compliance)):
+            force = response.base[row] + response.share[0] * work.multipliers[row]
+            response.force[row] = force
     return verdict
+
+
+@inlined
+def end_step(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
+    """Accepts a step: the holds are where they have come to, twist and frames what was found."""
+    response = holds.response
+    for row in range(len(holds.start)):
+        holds.before[row] = holds.after[row]
+        for other in range(len(response.compliance)):
+            holds.before[row] -= response.compliance[row, other] * response.force[other]
+    _accept(axes, hose, holds, state, p)
 
 
 @compiled
@@ -284,8 +331,33 @@ def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts
     n_rows = len(holds.start) + len(holds.twist.angle)
     work = make_work(hose.mass.shape[0], len(axes), n_rows)
     for _ in range(n_steps):
-        verdict = _take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+        verdict = take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        _accept(axes, hose, holds, state, work.span)
+        end_step(axes, hose, holds, state, work.span)
     return DONE
+
+
+@kernel
+def copy_state(source, target):  # type: ignore[no-untyped-def]
+    """Copies all of a state into another one."""
+    for k in range(len(source.x)):
+        target.x[k], target.v[k], target.a[k] = source.x[k], source.v[k], source.a[k]
+        target.x_old[k], target.v_old[k] = source.x_old[k], source.v_old[k]
+    target.started[0] = source.started[0]
+
+
+@compiled
+def try_step(axes, hose, holds, loads, limits, scheme, dt, state, trial, counts):  # type: ignore[no-untyped-def]
+    """Takes one step of a state into `trial`; returns a verdict. `keep_step` makes it count."""
+    n_rows = len(holds.start) + len(holds.twist.angle)
+    work = make_work(hose.mass.shape[0], len(axes), n_rows)
+    copy_state(state, trial)
+    return take_step(axes, hose, holds, loads, limits, scheme, dt, trial, work, counts)
+
+
+@compiled
+def keep_step(axes, hose, holds, trial, state):  # type: ignore[no-untyped-def]
+    """Makes a step of `try_step` count."""
+    copy_state(trial, state)
+    end_step(axes, hose, holds, state, make_span())

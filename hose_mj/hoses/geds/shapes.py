@@ -2,8 +2,8 @@
 
 A geom is one row of numbers, so that a whole scene crosses from Python in one array: its kind
 (MuJoCo's mjtGeom), friction, bounding radius, and then size, position, rotation, velocity and
-angular velocity as in geom_size, geom_xpos and geom_xmat, last a factor on the contact's stiffness.
-Distances are negative inside.
+angular velocity as in geom_size, geom_xpos and geom_xmat, a factor on the contact's stiffness, and
+the arc lengths between which the hose does not touch it. Distances are negative inside.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ PLANE, SPHERE, CAPSULE, CYLINDER, BOX = 0, 2, 3, 5, 6
 KIND, FRICTION, BOUND = 0, 1, 2
 SIZE, POSITION, ROTATION = 3, 6, 9
 VELOCITY, SPIN, SCALE = 18, 21, 24
-ROW = 25
+SKIP_FROM, SKIP_TO = 25, 26
+ROW = 27
 """Columns of a geom's row, and how many there are; the rotation is stored row by row."""
 _NO_AXIS = (0.0, 0.0, 0.0)
 

@@ -62,6 +62,33 @@ class Hose(NamedTuple):
     drag_rate: float
 
 
+class Response(NamedTuple):
+    """How far the bodies that hold a hose give way to it within a step.
+
+    With F the mean force of the holds on the hose over a step, what holds demand at its end is
+    after - compliance F. A stage knows F as base + share lambda, where lambda are its multipliers.
+
+    Attributes:
+        compliance: (m, m) over all rows, m/N; (0, 0) where nothing gives way.
+        base: (m,), N, written.
+        share: (1,), written.
+        gathered: sum of the multipliers of the stages, or parts of a step, before, (m,), written.
+        force: F of the last step, (m,), N, written.
+    """
+
+    compliance: Array
+    base: Array
+    share: Array
+    gathered: Array
+    force: Array
+
+
+def make_response(n_rows: int) -> Response:
+    """Returns the response of m = n_rows rows, all compliances zero."""
+    base, gathered, force = np.zeros((3, n_rows))
+    return Response(np.zeros((n_rows, n_rows)), base, np.ones(1), gathered, force)
+
+
 class Holds(NamedTuple):
     """m rows of G x = g.
 
@@ -73,6 +100,7 @@ class Holds(NamedTuple):
         after: g at its end, (m,).
         multipliers: lambda at the end of the last step, (m,), written.
         twist: clamps and the twist between them.
+        response: how far what holds the hose gives way.
     """
 
     start: np.ndarray
@@ -81,6 +109,7 @@ class Holds(NamedTuple):
     after: Array
     multipliers: Array
     twist: Twist
+    response: Response
 
 
 class Loads(NamedTuple):
@@ -334,11 +363,12 @@ def _add_hold_weight(axes, holds, weight, size, work):  # type: ignore[no-untype
 
 
 @inlined
-def solve_with_holds(axes, holds, softness, n_negative, size, work):  # type: ignore[no-untyped-def]
+def solve_with_holds(axes, holds, give, softness, n_negative, size, work):  # type: ignore[no-untyped-def]
     """Solves K dx - R^T lambda = -gradient, R dx + D lambda = shift with the factor in work.band.
 
-    The rows R are those of the holds (D = 0) and the derivatives of the stretches' twist
-    (D = compliance times `softness`), which adds R^T R / D to K. Writes dx into work.gradient and
+    The rows R are those of the holds (D = compliance of their response times `give`) and the
+    derivatives of the stretches' twist (D = compliance times `softness`), which adds R^T R / D to
+    K. Writes dx into work.gradient and
     lambda into work.multipliers. With K = L S L^T, S the signs of the pivots: Z = L^-1 R^T, and
     Z^T S Z + D is the matrix of lambda, so each row costs one forward solve.
 
@@ -387,6 +417,9 @@ def solve_with_holds(axes, holds, softness, n_negative, size, work):  # type: ig
                 for k in range(size):
                     product += z[row, k] * z[other, k]
             work.schur[row, other] = product
+        if row < len(holds.response.compliance):
+            for other in range(row + 1):
+                work.schur[row, other] += give * holds.response.compliance[row, other]
         if row >= n_holds:
             work.schur[row, row] += softness * twist.compliance[row - n_holds]
     n_found = _solve_dense(m, work.schur, work.multipliers)
@@ -513,7 +546,8 @@ def newton(axes, hose, stage, holds, fraction, loads, scale, limits, x, work):  
         if n_negative >= 0:
             for k in range(size):
                 work.residual[k] = work.gradient[k]
-            verdict = solve_with_holds(axes, holds, softness, n_negative, size, work)
+            give = fraction * holds.response.share[0]
+            verdict = solve_with_holds(axes, holds, give, softness, n_negative, size, work)
         if verdict == NOT_POSITIVE and exact:
             exact = False
             fallbacks += 1
@@ -563,6 +597,9 @@ def _prepare_holds(axes, holds, fraction, weight, x, work):  # type: ignore[no-u
     for row in range(len(holds.start)):
         before = holds.before[row]
         wanted = before + fraction * (holds.after[row] - before)
+        response = holds.response
+        for other in range(len(response.compliance)):
+            wanted -= fraction * response.compliance[row, other] * response.base[other]
         work.shift[row] = wanted - multiply_row(axes, holds, row, x, len(x))
     _shift_clamps(axes, holds.twist, fraction, work.shift)
     if weight > 0.0:

@@ -81,6 +81,30 @@ class Touching:
         changes |= {"velocity": velocity, "angular_velocity": angular_velocity}
         self._contacts.move(number, changes)
 
+    def place_obstacles(
+        self, numbers: np.ndarray, positions: Array, rotations: Array, twists: Array
+    ) -> None:
+        """Moves obstacles at once and unchecked, for worlds that do so every step.
+
+        Args:
+            numbers: of the obstacles, (k,).
+            positions: of each at the end of the next step, (k, 3), m.
+            rotations: (k, 3, 3).
+            twists: velocity and angular velocity, (k, 6), m/s, rad/s.
+        """
+        self._contacts.place(numbers, positions, rotations, twists)
+
+    def measure_obstacles(self, points: ArrayLike) -> Array:
+        """Signed distances of points (k, 3), m, from each obstacle, (G, k), m.
+
+        Raises:
+            InputError: points that are not finite or of another shape.
+        """
+        places = np.asarray(points, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
+            raise InputError("points", places.shape, "finite numbers, shape (k, 3)")
+        return self._contacts.measure(places)
+
     def set_distances(
         self,
         distances: ArrayLike | None,
@@ -109,12 +133,24 @@ class Touching:
             self._contacts.set_distances(distances, normals, friction, velocities, self._state.x)
         self._loads.set_contact(self._contacts.contact)
 
+    def measured_forces(self) -> Array:
+        """The part of `contact_forces` that comes from distances handed in, (Q, 3), N."""
+        return self._contacts.compute_given_forces(self._state.x, self._state.v)
+
+    def make_shapes(self, obstacles: Sequence[Obstacle]) -> Array:
+        """Returns obstacles as kernels read them (geds/shapes.py), in the hose's coordinates."""
+        return self._contacts.make_shapes(obstacles)
+
     def contact_forces(self) -> Array:
         """Contact forces on the hose at `contact_arc_lengths`, (Q, 3), N, world frame."""
         return self._contacts.compute_world_forces(self._state.x, self._state.v)
 
     def contact_reactions(self) -> list[Reaction]:
         """What the hose does to each obstacle: force (N), moment about its position (N m)."""
+        return [Reaction(row[:3], row[3:]) for row in self.push_on_obstacles()]
+
+    def push_on_obstacles(self) -> Array:
+        """`contact_reactions` as one array (G, 6): forces, moments."""
         return self._contacts.compute_reactions(self._state.x, self._state.v)
 
     def set_neighbour(

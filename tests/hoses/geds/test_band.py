@@ -84,7 +84,7 @@ def make_holds(d, seed=0, with_twist=False):
     clamps = [0.0, 0.5, 1.0] if with_twist else []
     twist = stretches.make_twist(spline, hose, clamps, np.zeros(spline.size))
     twist.rows[:, : N * d] = rng.normal(size=(len(twist.angle), N * d))
-    return solver.Holds(start, rows, *numbers, twist)
+    return solver.Holds(start, rows, *numbers, twist, solver.make_response(0))
 
 
 def stack(holds, size):
@@ -111,7 +111,7 @@ def test_solve_with_holds_matches_the_dense_kkt_system(d, with_twist):
         work.band[:] = packed
         work.gradient[:size], work.shift[:m] = gradient, shift
         assert banded.factorize(axes, size, work.band)
-        assert solver.solve_with_holds(axes, holds, 0.5, 0, size, work) == solver.DONE
+        assert solver.solve_with_holds(axes, holds, 0.0, 0.5, 0, size, work) == solver.DONE
         kkt = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
         wanted = np.linalg.solve(kkt, np.concatenate([-gradient, shift]))
         scale = np.abs(wanted).max()
@@ -141,7 +141,7 @@ def test_indefinite_matrix_is_solved_only_where_twist_and_holds_make_it_stable(d
         gradient = work.gradient[:size].copy()
         n_negative = banded.factorize_indefinite(axes, size, work.band, work.signs)
         assert n_negative == np.sum(np.linalg.eigvalsh(dense) < 0.0)
-        verdict = solver.solve_with_holds(axes, holds, 0.5, n_negative, size, work)
+        verdict = solver.solve_with_holds(axes, holds, 0.0, 0.5, n_negative, size, work)
         twist = rows[n_holds:]
         whole = dense + twist.T @ (twist / softness[n_holds:, None])
         null = scipy.linalg.null_space(rows[:n_holds])
@@ -165,5 +165,5 @@ def test_rows_that_depend_on_each_other_are_refused(d):
     work = solver.make_work(N, d, len(holds.start))
     work.band[:] = packed
     assert banded.factorize(axes, size, work.band)
-    verdict = solver.solve_with_holds(axes, holds, 1.0, 0, size, work)
+    verdict = solver.solve_with_holds(axes, holds, 0.0, 1.0, 0, size, work)
     assert verdict == solver.DEPENDENT_HOLDS

@@ -218,7 +218,7 @@ def test_laying_frames_anew_keeps_the_material_at_the_clamps_and_the_twist():
     rows[:, :, 3] = values[:, 0]
     twist.turn_rows[:] = np.arange(m)
     numbers = np.zeros((3, m))
-    holds = solver.Holds(starts, rows.reshape(m, 16), *numbers, twist)
+    holds = solver.Holds(starts, rows.reshape(m, 16), *numbers, twist, solver.make_response(0))
     # Frames that have gathered a smooth angle, theta that makes up for it.
     nodes = (np.cumsum(np.tile(HOSE.tables.gaps, N - 3)) - 0.5 * HOSE.tables.gaps[0]) * (
         LENGTH / (N - 3)

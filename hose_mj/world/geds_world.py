@@ -1,0 +1,201 @@
+"""`GedsWorld`: a spline hose coupled strongly to the bodies of an mjModel (docs/world.md).
+
+A step tries MuJoCo's own step under the forces of the hose, lets the hose find the forces with
+which both meet at the attachments, and goes on until they do. Hose and bodies exchange the very
+same impulses.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError, StepError
+from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.model import Array
+from hose_mj.scenes.mjcf import Scene
+from hose_mj.world.centre_line import CentreLine
+from hose_mj.world.coupling import Bodies
+from hose_mj.world.hose_touch import HoseTouch
+from hose_mj.world.laying import N_POINTS, count_control_points, lay_hose
+from hose_mj.world.measured_geoms import add_probe
+from hose_mj.world.pucks import Pucks
+from hose_mj.world.world import World
+
+GAP = 1e-6
+"""Largest distance of hose and site at the end of a step (m), where `MOST_SWEEPS` suffice."""
+MOST_SWEEPS = 6
+_SLOW = 5.0
+"""A sweep that closes the gap by less than this factor lets the next one try the other response."""
+
+
+class GedsWorld(World):
+    """Robots on a spline hose.
+
+    Args:
+        scene: checked.
+        timestep: of hose and bodies alike (s); None for the scene's.
+        control_points: of the hose; None for five spans between neighbouring robots, at least 16.
+        scheme: of the hose: bdf2 (default), backward-euler, sdirk2, midpoint. MuJoCo steps its
+            bodies with implicitfast whatever the scene says.
+        compiled_pucks: whether a scene of pucks, robots that are one body on slides each, steps in
+            compiled code while no puck is near anything; the motion is the same.
+
+    Attributes:
+        hose: the spline.
+        sweeps: how often hose and bodies were solved for one another so far.
+
+    Raises:
+        InputError: a value outside its valid set.
+    """
+
+    hose_model = "geds"
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        timestep: float | None = None,
+        control_points: int | None = None,
+        scheme: str = "bdf2",
+        compiled_pucks: bool = True,
+    ) -> None:
+        if scheme == "verlet":
+            raise InputError("scheme", scheme, "an implicit scheme for a hose on bodies")
+        spec = scene.make_spec()
+        add_probe(spec)
+        model = spec.compile()
+        super().__init__(scene, model)
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        model.opt.timestep = scene.timestep if timestep is None else timestep
+        n = count_control_points(self.n_robots) if control_points is None else control_points
+        self.hose = GedsHose(
+            scene.spec,
+            timestep=model.opt.timestep,
+            gravity=model.opt.gravity,
+            control_points=n,
+            scheme=scheme,
+            tolerance=1e-6,
+        )
+        self.sweeps = 0
+        self._start_bodies()
+        self._touch = HoseTouch(self.model, self.data, self.hose, self.sites, self.arc_lengths)
+        self._touch.set_obstacles(scene.friction)
+        self._bodies = Bodies(self.model, self.data, self.sites[:-1])
+        self._start = lay_hose(
+            *(scene.spec, self.site_positions(), self.arc_lengths),
+            *(self.hose.obstacles, self.hose.gravity),
+        )
+        self._pucks = Pucks.find(self, self._touch) if compiled_pucks else None
+        self.reset()
+
+    # -- the world's protocol ----------------------------------------------------------------------
+
+    @property
+    def timestep(self) -> float:
+        """Length of one step (s)."""
+        return self.hose.timestep
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the last reset (s)."""
+        return self.hose.time
+
+    def reset(self) -> None:
+        """See `World.reset`."""
+        self._start_bodies()
+        even = np.linspace(0.0, self.scene.spec.length, N_POINTS)
+        self.hose.reset(lambda s: np.stack([np.interp(s, even, x) for x in self._start.T], axis=1))
+        self._holds = [
+            self.hose.attach(float(s), place)
+            for s, place in zip(self.arc_lengths, self.site_positions(), strict=True)
+        ]
+        self._touch.reset()
+
+    def step(self, n_steps: int = 1) -> None:
+        """See `World.step`."""
+        check_count("n_steps", n_steps, 0)
+        while n_steps > 0:
+            done = 0
+            if self._pucks is not None:
+                done = self._pucks.step(self._holds[:-1], n_steps)
+            if done < n_steps:
+                self._step_bodies()
+                done += 1
+            n_steps -= done
+
+    def position(self, arc_length: ArrayLike) -> Array:
+        """See `World.position`."""
+        return self.hose.position(arc_length)
+
+    def velocity(self, arc_length: ArrayLike) -> Array:
+        """See `World.velocity`."""
+        return self.hose.velocity(arc_length)
+
+    def tension(self, arc_length: ArrayLike) -> Array:
+        """See `World.tension`."""
+        return self.hose.tension(arc_length)
+
+    def centre_line(self) -> CentreLine:
+        """See `World.centre_line`: the spline's own spans."""
+        return CentreLine.of_spline(*self.hose.find_spans())
+
+    def attachment_forces(self) -> Array:
+        """See `World.attachment_forces`: means over the last step; at the source its end's."""
+        at_source = self.hose.reaction(self._holds[-1]).force
+        return np.concatenate([self.hose.mean_forces(), at_source[None]])
+
+    def hose_snapshot(self) -> dict[str, Any]:
+        """See `World.hose_snapshot`."""
+        return {"hose": self.hose.snapshot(), "pushes": self._touch.pushes.copy()}
+
+    def restore_hose(self, state: dict[str, Any]) -> None:
+        """See `World.restore_hose`."""
+        self.hose.restore(state["hose"])
+        self._holds = self.hose.holds
+        self._update_poses()
+        self._touch.pushes[:] = state["pushes"]
+        self._touch.place()
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _step_bodies(self) -> None:
+        """One step of hose and bodies, MuJoCo's step tried until they meet."""
+        bodies, hose, held = self._bodies, self.hose, self._holds[:-1]
+        self._write_inputs()
+        self._touch.push(self.data.qfrc_applied)
+        bodies.begin()
+        self._touch.measure()
+        forces = np.zeros((len(held), 3))
+        reached = bodies.try_step(forces)
+        in_contact, before = True, np.inf
+        try:
+            for _ in range(MOST_SWEEPS):
+                give = bodies.find_compliance(in_contact)
+                aim = reached + (give @ forces.ravel()).reshape(-1, 3)
+                forces = hose.try_step(held, aim, give)
+                self.sweeps += 1
+                reached = bodies.try_step(forces)
+                gap = float(np.abs(reached - hose.find_held_positions()).max())
+                if gap < GAP:
+                    break
+                if gap > before / _SLOW:
+                    in_contact = not in_contact
+                before = gap
+        except StepError:
+            bodies.take_back()
+            raise
+        if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
+            bodies.take_back()
+            raise StepError(
+                f"the step at t = {self.time:.6g} s failed: MuJoCo met numbers that are not "
+                f"finite; try a time step below {self.timestep:g} s or smaller controls"
+            )
+        hose.keep_step()
+        bodies.end()
+        self._touch.update()

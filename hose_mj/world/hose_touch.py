@@ -1,0 +1,126 @@
+"""`HoseTouch`: contact between a spline hose and the geoms of a scene, both ways.
+
+The hose takes contact implicitly, with geoms where they are at the beginning of the step. What it
+does to bodies that can move acts on them in the next step, so that momentum is kept but for that
+delay.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.model import Array
+from hose_mj.world.measured_geoms import Distances, GeomMeter
+from hose_mj.world.scene_geoms import SceneGeoms
+
+_REACH = 2.0
+"""Meshes nearer than so many radii of the hose are measured."""
+
+
+class HoseTouch:
+    """The scene's geoms as a hose feels them.
+
+    Args:
+        model, data: MuJoCo's, poses as at the start.
+        hose: the hose.
+        sites, arc_lengths: as in `World`.
+
+    Attributes:
+        geoms: what may be touched.
+        pushes: what the hose has done in the last step to each of `geoms.moving`, force and moment
+            about the geom's position, (k, 6), N, N m.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        hose: GedsHose,
+        sites: np.ndarray,
+        arc_lengths: Array,
+    ) -> None:
+        self._model, self._data, self._hose = model, data, hose
+        self.geoms = SceneGeoms.find(model, data, sites, arc_lengths)
+        self.pushes = np.zeros((len(self.geoms.moving), 6))
+        self._moving = self.geoms.ids[self.geoms.moving]
+        self._meter = None
+        self._measured = Distances.none(len(hose.contact_arc_lengths))
+        self._measured_forces = np.zeros((len(hose.contact_arc_lengths), 3))
+        if len(self.geoms.measured):
+            reach = _REACH * hose.spec.radius
+            low, high = self.geoms.measured_skips.T[:, :, None]
+            s = hose.contact_arc_lengths
+            touched = (s < low) | (s > high)
+            self._meter = GeomMeter(model, self.geoms.measured, touched, reach)
+
+    def set_obstacles(self, friction: float) -> None:
+        """Hands the geoms to the hose as obstacles, where they are now."""
+        self._friction = friction
+        made = self.geoms.make_obstacles(self._model, self._data, friction)
+        self._hose.set_obstacles(made)
+
+    def reset(self) -> None:
+        """Forgets the last step; the geoms are where they are now."""
+        self.pushes[:], self._measured_forces[:] = 0.0, 0.0
+        self.place()
+
+    def place(self) -> None:
+        """Moves the obstacles to where their geoms are."""
+        if not len(self._moving):
+            return
+        data, k = self._data, len(self._moving)
+        mujoco.mj_comVel(self._model, data)
+        twists = np.array([self._find_twist(g) for g in self._moving])
+        rotations = data.geom_xmat[self._moving].reshape(k, 3, 3)
+        moving = self.geoms.moving
+        self._hose.place_obstacles(moving, data.geom_xpos[self._moving], rotations, twists)
+
+    def measure(self) -> None:
+        """Measures meshes; to be called before each step."""
+        if self._meter is None:
+            return
+        hose = self._hose
+        points = hose.position(hose.contact_arc_lengths)
+        found = self._measured = self._meter.measure(self._data, points)
+        speeds = np.zeros_like(points)
+        for g in np.unique(found.geoms[found.geoms >= 0]):
+            mine, twist = found.geoms == g, self._find_twist(g)
+            speeds[mine] = twist[:3] + np.cross(twist[3:], points[mine] - self._data.geom_xpos[g])
+        hose.set_distances(found.distances, found.normals, self._friction, speeds)
+
+    def _find_twist(self, geom: int) -> Array:
+        """Velocity and angular velocity of a geom, world frame, (6,); `mj_comVel` goes before."""
+        found, kind = np.zeros(6), mujoco.mjtObj.mjOBJ_GEOM
+        mujoco.mj_objectVelocity(self._model, self._data, kind, int(geom), found, 0)
+        return np.concatenate([found[3:], found[:3]])
+
+    def update(self) -> None:
+        """After a step: geoms move on, and what the hose does to them is known."""
+        if self._meter is not None:
+            self._measured_forces[:] = self._hose.measured_forces()
+        if not len(self._moving):
+            return
+        self.place()
+        self.pushes[:] = self._hose.push_on_obstacles()[self.geoms.moving]
+
+    def push(self, generalized: Array) -> None:
+        """Adds what the hose did to moving geoms in the last step to generalised forces (nv,)."""
+        for row, g in zip(self.pushes, self._moving, strict=True):
+            if row.any():
+                mujoco.mj_applyFT(
+                    *(self._model, self._data, row[:3], row[3:], self._data.geom_xpos[g]),
+                    *(self._model.geom_bodyid[g], generalized),
+                )
+        points = None
+        for q in np.flatnonzero(self._measured_forces.any(axis=1)):
+            body = self._model.geom_bodyid[self._measured.geoms[q]]
+            if self._measured.geoms[q] < 0 or self._model.body_weldid[body] == 0:
+                continue
+            if points is None:
+                points = self._hose.position(self._hose.contact_arc_lengths)
+            force = -self._measured_forces[q]
+            mujoco.mj_applyFT(
+                *(self._model, self._data, force, np.zeros(3), points[q], body, generalized)
+            )

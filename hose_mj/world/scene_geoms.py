@@ -1,0 +1,109 @@
+"""What of a scene a hose may touch; robots are left out near their own sites.
+
+MuJoCo's rule decides which geoms collide, with contype = conaffinity = 1 for the hose. Planes,
+spheres, capsules, cylinders and boxes become `Obstacle`s. Meshes, ellipsoids and what else MuJoCo
+can measure the distance of go through `mj_geomDistance` (measured_geoms.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from hose_mj.hoses.model import Array
+from hose_mj.hoses.obstacles import KINDS, Obstacle
+
+KIND_NAMES = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")): kind for kind in KINDS}
+"""MuJoCo's numbers of the shapes that are obstacles, and their names."""
+OWN_ARC = 3.0
+"""Arc on either side of a robot's site where the hose does not touch that robot, in its radii."""
+
+
+@dataclass(frozen=True)
+class SceneGeoms:
+    """The geoms of a scene that a hose may touch.
+
+    Attributes:
+        ids: of those that are obstacles, (G,).
+        measured: ids of those that MuJoCo measures, (M,).
+        moving: places in `ids` of those whose bodies can move.
+        skips: arc lengths between which each of `ids` is not touched, (G, 2), m.
+        measured_skips: the same for `measured`, (M, 2), m.
+    """
+
+    ids: np.ndarray
+    measured: np.ndarray
+    moving: np.ndarray
+    skips: Array
+    measured_skips: Array
+
+    @classmethod
+    def find(
+        cls, model: mujoco.MjModel, data: mujoco.MjData, sites: np.ndarray, arc_lengths: Array
+    ) -> SceneGeoms:
+        """Finds them, with poses at the start in `data`; `sites` as in `World`."""
+        touched = find_colliding(model)
+        kinds = model.geom_type[touched]
+        simple = np.isin(kinds, list(KIND_NAMES))
+        skips = np.tile([np.inf, -np.inf], (model.ngeom, 1))
+        for site, s in zip(sites[:-1], arc_lengths[:-1], strict=True):
+            root = model.body_rootid[model.site_bodyid[site]]
+            own = np.flatnonzero(model.body_rootid[model.geom_bodyid] == root)
+            arc = OWN_ARC * find_radius(model, data, site, own)
+            skips[own] = [s - arc, s + arc]
+        ids = touched[simple]
+        bodies = model.geom_bodyid[ids]
+        moving = np.flatnonzero(model.body_weldid[bodies] != 0)
+        measured = touched[~simple]
+        return cls(ids, measured, moving, skips[ids], skips[measured])
+
+    def make_obstacles(
+        self, model: mujoco.MjModel, data: mujoco.MjData, friction: float
+    ) -> list[Obstacle]:
+        """Returns the obstacles at the poses in `data`, at rest."""
+        return [
+            Obstacle(
+                kind=KIND_NAMES[int(model.geom_type[g])],
+                position=data.geom_xpos[g],
+                rotation=data.geom_xmat[g],
+                size=model.geom_size[g],
+                friction=friction,
+                skips=(float(skip[0]), float(skip[1])),
+            )
+            for g, skip in zip(self.ids, self.skips, strict=True)
+        ]
+
+
+def find_colliding(model: mujoco.MjModel) -> np.ndarray:
+    """Ids of the geoms that collide with a hose of contype = conaffinity = 1."""
+    return np.flatnonzero((model.geom_contype & 1) | (model.geom_conaffinity & 1))
+
+
+def find_radius(model: mujoco.MjModel, data: mujoco.MjData, site: int, geoms: np.ndarray) -> float:
+    """Largest horizontal distance of colliding geoms of a robot from its site (m).
+
+    Exact for upright cylinders and for spheres, by bounding boxes for others; all of its geoms
+    where none collides.
+    """
+    solid = geoms[(model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0]
+    if not len(solid):
+        solid = geoms
+    centre = data.site_xpos[site]
+    radius = 0.0
+    for g in solid:
+        axes = data.geom_xmat[g].reshape(3, 3)
+        box = model.geom_aabb[g]
+        middle = data.geom_xpos[g] + axes @ box[:3] - centre
+        kind, size = model.geom_type[g], model.geom_size[g]
+        upright = abs(axes[2, 2]) > 1.0 - 1e-9
+        if kind == mujoco.mjtGeom.mjGEOM_SPHERE or (
+            kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE) and upright
+        ):
+            radius = max(radius, float(np.hypot(middle[0], middle[1]) + size[0]))
+            continue
+        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8)
+        corners = middle[:, None] + axes @ (box[3:, None] * signs)
+        radius = max(radius, float(np.hypot(corners[0], corners[1]).max()))
+    return radius

@@ -114,7 +114,8 @@ class Stage:
         low, high: corners of the space worth looking at, (3,) each, finite, m.
         bounds: lowest and highest place for the robots, (2, 3), infinite where there is no bound.
         settings: shown beside it, in this order.
-        cell: width of the squares drawn on the ground, m; 0 for none.
+        source: where the hose begins, (3,), m.
+        cell: width of the squares drawn on the ground around the source, m; 0 for none.
     """
 
     name: str
@@ -131,6 +132,7 @@ class Stage:
     low: Array
     high: Array
     bounds: Array
+    source: Array
     settings: dict[str, str] = field(default_factory=dict)
     cell: float = 0.0
 
@@ -146,7 +148,7 @@ class Stage:
                     f"body of geom {geom.name!r}", geom.body, f"-1 to {len(self.bodies) - 1}"
                 )
         check_rising(f"{what}: arc_lengths", lock_array(self, "arc_lengths", what), at_least=2)
-        for name in ("low", "high"):
+        for name in ("low", "high", "source"):
             check_shape(f"{what}: {name}", lock_array(self, name, what), (3,))
         if not np.all(self.low < self.high):
             raise InputError(f"{what}: low", self.low.tolist(), f"below {self.high.tolist()}")

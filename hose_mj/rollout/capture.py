@@ -16,7 +16,7 @@ from hose_mj.recording.world_episode import (
     SampleBuffer,
     WorldEpisode,
 )
-from hose_mj.rollout.staging import N_POINTS, Cast, make_stage
+from hose_mj.rollout.staging import N_POINTS, Cast, make_stage, read_control_points
 from hose_mj.world.world import World
 
 CHUNK = 64
@@ -51,7 +51,7 @@ class Capture:
         self._outcome: Outcome | None = None
 
     def start(
-        self, world: World, monitor: Any | None, settings: Mapping[str, str] | None = None
+        self, world: World, monitor: Any | None, settings: Mapping[str, Any] | None = None
     ) -> None:
         """Begins an episode; nothing is recorded yet but the stage."""
         self.stage, self._cast = make_stage(world, monitor, settings or {}, self._n_points)
@@ -86,13 +86,12 @@ class Capture:
             "positions": world.data.xpos[cast.bodies],
             "quaternions": world.data.xquat[cast.bodies],
             "hose": world.position(stage.arc_lengths),
+            "control_points": read_control_points(world),
             "tension": world.tension(stage.arc_lengths),
             "attachments": world.site_positions(),
             "forces": world.attachment_forces(),
             "margins": np.where(np.isfinite(margins), margins, np.nan),
         }
-        if stage.n_control_points:
-            numbers["control_points"] = world.control_points()  # type: ignore[attr-defined]
         vetoed, events = ", ".join(info.get("vetoed", ())), ", ".join(info.get("events", ()))
         chunk.append(info.get("owner", "") or "", vetoed, events, **numbers)
 

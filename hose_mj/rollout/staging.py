@@ -10,6 +10,7 @@ import numpy as np
 
 from hose_mj.hoses.model import Array
 from hose_mj.recording.stage import WORLD, Geom, Margin, Rgba, Stage
+from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.world import World
 
 N_POINTS = 81
@@ -100,7 +101,7 @@ class Cast:
 
 
 def make_stage(
-    world: World, monitor: Any | None, settings: Mapping[str, str], n_points: int = N_POINTS
+    world: World, monitor: Any | None, settings: Mapping[str, Any], n_points: int = N_POINTS
 ) -> tuple[Stage, Cast]:
     """Makes the stage of a world as it stands now.
 
@@ -113,7 +114,6 @@ def make_stage(
     cast, scene = Cast(world), world.scene
     geoms = tuple(cast.make_geom(i) for i in cast.list_geoms())
     low, high = find_space(world, geoms)
-    points = getattr(world, "control_points", None)
     stage = Stage(
         name=world.hose_model,
         title=f"{scene.path.stem}, {world.hose_model}",
@@ -125,13 +125,22 @@ def make_stage(
         hose_radius=scene.spec.radius,
         tension_limit=find_tension_limit(world, monitor),
         margins=list_margins(monitor),
-        n_control_points=0 if points is None else len(points()),
+        n_control_points=len(read_control_points(world)),
         low=low,
         high=high,
         bounds=np.array(scene.bounds),
-        settings=dict(settings),
+        source=world.site_positions()[-1],
+        settings={name: str(value) for name, value in settings.items()},
+        cell=float(getattr(scene, "cell_size", scene.spec.length / 16.0)),
     )
     return stage, cast
+
+
+def read_control_points(world: World) -> Array:
+    """Returns the control points of a spline hose, or the nodes of a chain, (C, 3), m."""
+    if isinstance(world, GedsWorld):
+        return world.hose.control_points
+    return world.position(world.centre_line().arc_lengths)
 
 
 def find_space(world: World, geoms: tuple[Geom, ...]) -> tuple[Array, Array]:
@@ -139,11 +148,9 @@ def find_space(world: World, geoms: tuple[Geom, ...]) -> tuple[Array, Array]:
     corners = [world.site_positions(), world.goal_position()[None]]
     for geom in geoms:
         if geom.body == WORLD and geom.kind != "mesh" and (geom.kind != "plane" or geom.size[0]):
-            reach = np.zeros(3)
             turn = np.zeros(9)
             mujoco.mju_quat2Mat(turn, geom.quaternion)
-            half = _half_sizes(geom)
-            reach = np.abs(turn.reshape(3, 3)) @ half
+            reach = np.abs(turn.reshape(3, 3)) @ _half_sizes(geom)
             corners.append(np.stack([geom.position - reach, geom.position + reach]))
     bounds = np.array(world.scene.bounds)
     points = np.concatenate(corners)

@@ -54,9 +54,6 @@ class RailWorld(World):
     def tension(self, arc_length):
         return 4.0 * self.time * np.asarray(arc_length) / self.scene.spec.length
 
-    def control_points(self):
-        return self.position(np.linspace(0.0, self.scene.spec.length, 9))
-
     def centre_line(self):
         s = np.linspace(0.0, self.scene.spec.length, 9)
         return CentreLine.of_chain(s, self.position(s))

@@ -44,7 +44,7 @@ def make_world_blueprint(stages: Sequence[Stage], follow: bool = False) -> rrb.B
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/settings", name="Settings"),
         rrb.StateTimelineView(origin="/states", name="Turns, vetoes, breaks"),
-        rrb.TextLogView(origin="/log", name="Events"),
+        _make_log(),
         row_shares=[1.6, 1.0, 1.0],
     )
     return rrb.Blueprint(
@@ -58,6 +58,12 @@ def make_world_blueprint(stages: Sequence[Stage], follow: bool = False) -> rrb.B
             loop_mode="off" if follow else "all",
         ),
     )
+
+
+def _make_log() -> rrb.TextLogView:
+    """Time, level and text: whose entity it is says little."""
+    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin="/log", name="Events", columns=columns)
 
 
 def _make_view(
@@ -85,7 +91,7 @@ def _place_eye(stage: Stage) -> rrb.EyeControls3D:
     outward = np.array(_LOOKS[stage.is_planar])
     outward /= np.linalg.norm(outward)
     radius = 0.5 * float(np.linalg.norm(stage.high - stage.low))
-    eye = middle + 0.88 * radius / _HALF_VIEW * outward
+    eye = middle + 1.06 * radius / _HALF_VIEW * outward
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=[0.0, 0.0, 1.0]
     )
@@ -109,7 +115,7 @@ def _make_scale(stage: Stage) -> rrb.Spatial2DView:
         origin=f"/{SCALE}",
         name=f"Tension of the hose: red at its limit, {stage.tension_limit:.3g} N",
         background=rrb.Background(color=DARK),
-        visual_bounds=rrb.VisualBounds2D(x_range=[-30, 430], y_range=[-3, 22]),
+        visual_bounds=rrb.VisualBounds2D(x_range=[-30, 430], y_range=[-5, 31]),
     )
 
 
@@ -120,7 +126,7 @@ def _make_plots(stages: Sequence[Stage]) -> rrb.Horizontal:
     plots = [
         rrb.TimeSeriesView(
             origin="/plots",
-            name=f"Margins, {name_quantity(unit).lower()}; below 0 broken",
+            name=f"Margins: {name_quantity(unit)}, broken below 0",
             contents=[f"/plots/{name}/{unit}/**" for name in names],
             plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=True),
         )

@@ -40,7 +40,7 @@ def write_world_recording(
     try:
         stream = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
         stream.save(temp, default_blueprint=make_world_blueprint(stages))
-        log_settings(stream, stages)
+        log_settings(stream, stages, [describe_ending(e.stage, e.outcome) for e in episodes])
         log_scene(stream, stages[0])
         for rank, episode in enumerate(episodes):
             log = WorldLog(stream, episode.stage, choose_look(episode.stage, rank))
@@ -67,6 +67,7 @@ class RecordingFile:
     def begin(self, stage: Stage) -> None:
         """Opens the file, under another name as yet."""
         self._temp = make_temp_beside(self._path)
+        self._stage = stage
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)
         self._stream.save(self._temp, default_blueprint=make_world_blueprint([stage]))
         self._log = open_log(self._stream, stage)
@@ -78,6 +79,7 @@ class RecordingFile:
     def end(self, outcome: Outcome) -> None:
         """Writes how it ended, and puts the file in its place."""
         self._log.end(outcome)
+        log_settings(self._stream, [self._stage], [describe_ending(self._stage, outcome)])
         self._stream.flush()
         self._stream.disconnect()
         replace_atomically(self._temp, self._path)
@@ -96,6 +98,7 @@ class LiveView:
 
     def begin(self, stage: Stage) -> None:
         """Connects and shows the stage."""
+        self._stage = stage
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)
         self._stream.connect_grpc(self._url)
         self._stream.send_blueprint(make_world_blueprint([stage], follow=True))
@@ -109,12 +112,19 @@ class LiveView:
     def end(self, outcome: Outcome) -> None:
         """Sends how it ended."""
         self._log.end(outcome)
+        log_settings(self._stream, [self._stage], [describe_ending(self._stage, outcome)])
         self._stream.flush(timeout_sec=_PATIENCE)
         self._stream.disconnect()
 
 
 _PATIENCE = 30.0
 """How long a viewer may take for one stretch before the rest is kept from it (s)."""
+
+
+def describe_ending(stage: Stage, outcome: Outcome) -> str:
+    """Returns one Markdown line on how an episode ended."""
+    ending = f"**{stage.name}: {outcome.ended_by}**"
+    return ending if outcome.mark is None else f"{ending}. {outcome.mark.text}"
 
 
 def open_log(stream: rr.RecordingStream, stage: Stage) -> WorldLog:

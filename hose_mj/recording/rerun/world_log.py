@@ -203,15 +203,16 @@ class WorldLog:
         stream, stage = self._stream, self._stage
         stream.set_log_time_enabled(False)
         stream.set_time(TIMELINE, duration=mark.time)
-        size = 0.025 * stage.size
-        ball = rr.Ellipsoids3D(
-            centers=[mark.place], half_sizes=[[size] * 3], colors=[(*BREAK_COLOR, 110)],
-            fill_mode="solid",
-        )  # fmt: skip
+        top = mark.place + np.array([0.0, 0.0, 0.16 * stage.size])
+        ball = rr.Points3D([mark.place], colors=[BREAK_COLOR], radii=[0.014 * stage.size])
         stream.log(path_of(stage, "break"), ball)
+        pin = rr.LineStrips3D(
+            [[mark.place, top]], colors=[BREAK_COLOR], radii=[0.0035 * stage.size]
+        )
+        stream.log(path_of(stage, "break", "pin"), pin)
         label = rr.Points3D(
-            [mark.place + np.array([0.0, 0.0, 2.0 * size])],
-            labels=[f"{self._label(mark.kind)} breaks"],
+            [top],
+            labels=[f"{self._label(mark.kind)}, {mark.time:.2f} s"],
             radii=0.0,
             colors=[BREAK_COLOR],
             show_labels=True,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from hose_mj.recording.captions import format_settings
+from hose_mj.recording.captions import format_table
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import Rgb, find_color, mix
 from hose_mj.recording.rerun.parts import log_document
@@ -20,6 +20,7 @@ SCENE = "world/scene"
 SCALE = "tension"
 GOAL_COLOR = (60, 200, 110)
 BOUNDS_COLOR = (150, 165, 185)
+CELL_COLOR = (120, 132, 148)
 _PLANE_THICKNESS = 0.004
 """Of the stage's size: a plane is drawn as a thin box whose top it is."""
 
@@ -61,6 +62,7 @@ def log_scene(stream: rr.RecordingStream, stage: Stage) -> None:
             log_geom(stream, f"{SCENE}/{rr.escape_entity_path_part(geom.name)}", geom, stage)
     _log_goal(stream, stage)
     _log_bounds(stream, stage)
+    _log_cells(stream, stage)
     _log_scale(stream, stage)
 
 
@@ -72,14 +74,18 @@ def log_robots(stream: rr.RecordingStream, stage: Stage, look: Look) -> None:
             log_geom(stream, path, geom, stage, look)
 
 
-def log_settings(stream: rr.RecordingStream, stages: Sequence[Stage]) -> None:
-    """Logs the settings of all episodes as one text."""
-    lines = [f"# {stages[0].title}"]
+def log_settings(
+    stream: rr.RecordingStream, stages: Sequence[Stage], endings: Sequence[str] = ()
+) -> None:
+    """Logs how the episodes ended, their settings and what the picture's colours mean."""
+    lines = [f"# {stages[0].title}", *endings]
     for stage in stages:
-        limit = f"{stage.tension_limit:.4g} N"
-        arrows = f"{0.1 * force_scale(stages[0]) * stage.tension_limit:.3g} m"
-        shown = {"red tension": limit, "arrow of a tenth of it": arrows}
-        lines.append(format_settings({"model": stage.name, **stage.settings, **shown}))
+        scale = 10.0 ** np.floor(np.log10(stage.tension_limit))
+        shown = {
+            "red hose": f"{stage.tension_limit:.4g} N",
+            "violet arrow": f"force, {scale * force_scale(stage):.3g} m for {scale:g} N",
+        }
+        lines.append(format_table({"model": stage.name, **stage.settings, **shown}))
     log_document(stream, "settings", "\n\n".join(lines))
 
 
@@ -173,6 +179,25 @@ def _log_bounds(stream: rr.RecordingStream, stage: Stage) -> None:
     stream.log(f"{SCENE}/bounds", lines, static=True)
 
 
+def _log_cells(stream: rr.RecordingStream, stage: Stage) -> None:
+    """The cells of the ground, centred on the source, as far as the bounds reach."""
+    low, high = stage.bounds[:, :2]
+    if not (stage.cell and np.all(np.isfinite(stage.bounds[:, :2]))):
+        return
+    z = stage.low[2] + 0.001 * stage.size
+    strips = []
+    for axis in (0, 1):
+        first = stage.source[axis] + stage.cell * (
+            0.5 + np.ceil((low[axis] - stage.source[axis]) / stage.cell - 0.5 - 1e-9)
+        )
+        for place in np.arange(first, high[axis] + 1e-9, stage.cell):
+            ends = np.array([[*low, z], [*high, z]])
+            ends[:, axis] = place
+            strips.append(ends)
+    lines = rr.LineStrips3D(strips, colors=[CELL_COLOR], radii=[0.0006 * stage.size])
+    stream.log(f"{SCENE}/cells", lines, static=True)
+
+
 def _log_scale(stream: rr.RecordingStream, stage: Stage) -> None:
     """A bar of the colours with tensions below it; the view counts rows down."""
     colors, tensions = make_scale(stage.tension_limit)
@@ -182,7 +207,7 @@ def _log_scale(stream: rr.RecordingStream, stage: Stage) -> None:
     places = width * (tensions - low) / (high - low)
     labels = [f"{tension:.3g} N" for tension in tensions]
     ticks = rr.Points2D(
-        np.column_stack([places, np.full(len(places), height + 4.0)]),
+        np.column_stack([places, np.full(len(places), height + 7.0)]),
         labels=labels,
         radii=0.0,
         colors=[(200, 206, 214)],

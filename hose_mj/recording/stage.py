@@ -167,6 +167,12 @@ class Stage:
         return float(np.max(self.high - self.low))
 
     @property
+    def ground(self) -> float:
+        """Height of the highest plane, or of the lowest thing where there is none (m)."""
+        planes = [geom.position[2] for geom in self.geoms if geom.kind == "plane"]
+        return float(max(planes, default=self.low[2]))
+
+    @property
     def is_planar(self) -> bool:
         """Whether it is much wider than high."""
         extent = self.high - self.low

@@ -10,6 +10,9 @@ from hose_mj.recording.palette import Rgb
 APPLICATION_ID = "hose_mj"
 TIMELINE = "sim_time"
 TURNS = "turn"
+OUTCOME = "outcome"
+"""Begins the names of the properties that say how episodes ended."""
+FACTS = ("ended_by", "break_kind", "break_time", "break_text")
 DARK = (17, 20, 24)
 """Ground colour of the spatial views."""
 

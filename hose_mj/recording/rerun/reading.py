@@ -8,6 +8,7 @@ from typing import Any
 from rerun.chunk import RrdReader
 
 from hose_mj.errors import InputError
+from hose_mj.recording.rerun.parts import FACTS, OUTCOME
 
 
 def read_recording(path: Path) -> dict[str, Any]:
@@ -48,3 +49,25 @@ def read_recording(path: Path) -> dict[str, Any]:
         "n_blueprints": n_blueprints,
         "entities": entities,
     }
+
+
+def read_outcomes(path: Path) -> dict[str, dict[str, Any]]:
+    """Returns how the episodes of a recording ended, by the name of the hose model.
+
+    Each has `ended_by`, and where a constraint broke `break_kind`, `break_time` (s) and
+    `break_text`. Empty for a recording without episodes in a world.
+
+    Raises:
+        InputError: no such file, or nothing recorded in it.
+    """
+    read_recording(path)
+    reader = RrdReader(path)
+    prefix = f"/__properties/{OUTCOME}"
+    found: dict[str, dict[str, Any]] = {}
+    for chunk in reader.stream(store=reader.recordings()[0]):
+        entity = str(chunk.entity_path)
+        if entity.startswith(prefix):
+            row = chunk.to_record_batch().to_pylist()[0]
+            name = entity[len(prefix) :].replace("\\", "").strip()
+            found[name] = {key: row[key][0] for key in FACTS if row.get(key)}
+    return found

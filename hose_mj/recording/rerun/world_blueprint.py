@@ -40,7 +40,7 @@ def make_world_blueprint(stages: Sequence[Stage], follow: bool = False) -> rrb.B
         _make_view(stage, "From above", contents, hidden, _place_top(stage)),
         column_shares=[1.35, 1.0],
     )
-    left = rrb.Vertical(views, _make_scale(stage), _make_plots(stages), row_shares=[3.4, 0.42, 1.5])
+    left = rrb.Vertical(views, _make_scale(stage), _make_plots(stages), row_shares=[3.4, 0.5, 1.5])
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/settings", name="Settings"),
         rrb.StateTimelineView(origin="/states", name="Turns, vetoes, breaks"),

@@ -85,42 +85,6 @@ class RecordingFile:
         replace_atomically(self._temp, self._path)
 
 
-class LiveView:
-    """A sink that sends a run to a viewer that listens.
-
-    Args:
-        url: of the viewer, such as "rerun+http://127.0.0.1:9876/proxy".
-        recording_id: see `RecordingFile`.
-    """
-
-    def __init__(self, url: str, recording_id: str | None = None) -> None:
-        self._url, self._id = url, recording_id
-
-    def begin(self, stage: Stage) -> None:
-        """Connects and shows the stage."""
-        self._stage = stage
-        self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)
-        self._stream.connect_grpc(self._url)
-        self._stream.send_blueprint(make_world_blueprint([stage], follow=True))
-        self._log = open_log(self._stream, stage)
-
-    def add(self, samples: Samples) -> None:
-        """Sends a stretch."""
-        self._log.add(samples)
-        self._stream.flush(timeout_sec=_PATIENCE)
-
-    def end(self, outcome: Outcome) -> None:
-        """Sends how it ended."""
-        self._log.end(outcome)
-        log_settings(self._stream, [self._stage], [describe_ending(self._stage, outcome)])
-        self._stream.flush(timeout_sec=_PATIENCE)
-        self._stream.disconnect()
-
-
-_PATIENCE = 30.0
-"""How long a viewer may take for one stretch before the rest is kept from it (s)."""
-
-
 def describe_ending(stage: Stage, outcome: Outcome) -> str:
     """Returns one Markdown line on how an episode ended."""
     ending = f"**{stage.name}: {outcome.ended_by}**"

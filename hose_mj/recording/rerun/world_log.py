@@ -9,13 +9,12 @@ import rerun as rr
 
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import OTHERS, Rgb, lighten
-from hose_mj.recording.rerun.parts import TIMELINE, TURNS, make_time
+from hose_mj.recording.rerun.parts import OUTCOME, TIMELINE, TURNS, make_time
 from hose_mj.recording.rerun.world_stage import Look, force_scale, log_robots, path_of
 from hose_mj.recording.stage import Margin, Stage
 from hose_mj.recording.tension import color_tension
 from hose_mj.recording.world_episode import BreakMark, Outcome, Samples
 
-OUTCOME = "outcome"
 BREAK_COLOR: Rgb = (255, 40, 50)
 FORCE_COLOR: Rgb = (190, 120, 255)
 CONTROL_COLOR: Rgb = (120, 230, 255)
@@ -65,7 +64,7 @@ class WorldLog:
         if mark is not None:
             self._mark_break(mark)
             facts |= {"break_kind": mark.kind, "break_time": mark.time, "break_text": mark.text}
-        self._stream.send_property(f"{OUTCOME}/{self._name}", rr.AnyValues(**facts))
+        self._stream.send_property(f"{OUTCOME} {self._stage.name}", rr.AnyValues(**facts))
 
     @property
     def _name(self) -> str:

@@ -170,7 +170,7 @@ def _log_bounds(stream: rr.RecordingStream, stage: Stage) -> None:
         return
     low, high = stage.bounds
     lift = 0.002 * stage.size
-    levels = stage.bounds[:, 2] if finite[:, 2].all() else np.array([stage.low[2] + lift])
+    levels = stage.bounds[:, 2] if finite[:, 2].all() else np.array([stage.ground + lift])
     ring = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     rings = [np.column_stack([np.vstack([ring, ring[:1]]), np.full(5, z)]) for z in levels]
     posts = [[[*corner, levels[0]], [*corner, levels[-1]]] for corner in ring]
@@ -184,7 +184,7 @@ def _log_cells(stream: rr.RecordingStream, stage: Stage) -> None:
     low, high = stage.bounds[:, :2]
     if not (stage.cell and np.all(np.isfinite(stage.bounds[:, :2]))):
         return
-    z = stage.low[2] + 0.001 * stage.size
+    z = stage.ground + 0.001 * stage.size
     strips = []
     for axis in (0, 1):
         first = stage.source[axis] + stage.cell * (

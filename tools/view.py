@@ -35,7 +35,10 @@ def run(args: Args) -> int:
 
     recording = find_recording(args.file)
     outcomes = read_outcomes(recording)
-    at_s = find_break_time(outcomes) if args.at is None else args.at
+    broke_at = find_break_time(outcomes)
+    at_s = args.at
+    if at_s is None and broke_at is not None:
+        at_s = broke_at + 1e-6  # just after, whatever the clock is rounded to
     for name, outcome in outcomes.items():
         text = outcome.get("break_text", f"ended by {outcome['ended_by']}")
         print(f"{recording.name}, {name}: {text}", file=sys.stderr)

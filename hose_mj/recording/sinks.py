@@ -6,11 +6,12 @@ import queue
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Protocol
 
 from hose_mj.recording.stage import Stage
 from hose_mj.recording.world_episode import Outcome, Samples
+
+_RESERVED = 3  # begin, end, and the mark that nothing follows
 
 
 class Sink(Protocol):
@@ -42,14 +43,21 @@ class Background:
         lossy: whether stretches may be dropped.
         most: stretches that wait at most.
         patience_s: how long `end` waits for a lossy sink (s).
+        give_up: called when a lossy sink has not finished in that time.
     """
 
     def __init__(
-        self, sink: Sink, name: str, lossy: bool, most: int = 32, patience_s: float = 0.2
+        self,
+        sink: Sink,
+        name: str,
+        lossy: bool,
+        most: int = 32,
+        patience_s: float = 1.0,
+        give_up: Callable[[], None] | None = None,
     ) -> None:
         self._sink, self._name, self._lossy = sink, name, lossy
-        self._most, self._patience = most, patience_s
-        self._jobs: queue.Queue[Callable[[], None] | None] = queue.Queue(most)
+        self._most, self._patience, self._give_up = most, patience_s, give_up
+        self._jobs: queue.Queue[Callable[[], None] | None] = queue.Queue()
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
         self._complained = False
@@ -63,12 +71,12 @@ class Background:
         if self._dropping:
             self._complain()
             return
-        self._jobs = queue.Queue(self._most)
+        self._jobs = queue.Queue(self._most + _RESERVED)
         self._thread = threading.Thread(
             target=self._work, args=[self._jobs], name=self._name, daemon=True
         )
         self._thread.start()
-        self._put(lambda: self._sink.begin(stage))
+        self._put(lambda: self._sink.begin(stage), must=True)
 
     def add(self, samples: Samples) -> None:
         """Adds a stretch."""
@@ -86,21 +94,17 @@ class Background:
             self._raise()
         elif self._thread.is_alive() or self._error is not None:
             self._complain()
+            if self._give_up is not None:
+                self._give_up()
 
     def _put(self, job: Callable[[], None] | None, must: bool = False) -> None:
-        """Queues a job; a lossy sink's queue, when full, loses it, or another if this one must."""
+        """Queues a job; what a lossy sink must hear always finds room, the rest may be lost."""
         if not self._lossy:
             self._jobs.put(job)
-            return
-        while not self._dropping:
-            with suppress(queue.Full):
-                self._jobs.put_nowait(job)
-                return
+        elif self._dropping or not (must or self._jobs.qsize() < self._most):
             self._complain()
-            if not must:
-                return
-            with suppress(queue.Empty):
-                self._jobs.get_nowait()
+        else:
+            self._jobs.put_nowait(job)
 
     def _work(self, jobs: queue.Queue[Callable[[], None] | None]) -> None:
         while (job := jobs.get()) is not None:

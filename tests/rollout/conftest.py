@@ -97,7 +97,7 @@ def make_break(world):
     )
 
 
-def play(capture, world, monitor, n_samples=30, settings=None):
+def play_episode(capture, world, monitor, n_samples=30, settings=None):
     """An episode of 0.1 s a sample, with two robots in turn, that breaks at 2.5 s."""
     capture.start(world, monitor, settings or {"policy": "rails"})
     for k in range(n_samples):
@@ -125,9 +125,14 @@ def monitor(world):
 
 
 @pytest.fixture
+def play():
+    return play_episode
+
+
+@pytest.fixture
 def episode(world, monitor):
     from hose_mj.rollout.capture import Capture
 
     capture = Capture(keep=True)
-    play(capture, world, monitor)
+    play_episode(capture, world, monitor)
     return capture.episode()

@@ -49,13 +49,21 @@ def open_sinks(
         sinks.append(Background(RecordingFile(save, recording_id), "file", lossy=False))
     if connect is not None:
         check_url(connect)
-        live = LiveView(connect, recording_id, wait_s=2.0)
-        sinks.append(Background(live, f"viewer at {connect}", lossy=True))
+        live = LiveView(connect, recording_id)
+        sinks.append(make_lossy(live, f"viewer at {connect}", patience_s=1.0))
     if spawn:
-        url = open_window()
-        live = LiveView(url, recording_id, wait_s=_START_S)
-        sinks.append(Background(live, "viewer", lossy=True))
+        live = LiveView(open_window(), recording_id, wait_s=_START_S)
+        sinks.append(make_lossy(live, "viewer", patience_s=_START_S))
     return sinks
+
+
+def make_lossy(live: LiveView, name: str, patience_s: float) -> Background:
+    """Returns a live view that never holds up the run, nor the end of the process.
+
+    At its end a process would wait for a viewer that does not answer, however long that takes.
+    """
+    stop_waiting = rr.unregister_shutdown
+    return Background(live, name, lossy=True, patience_s=patience_s, give_up=stop_waiting)
 
 
 class LiveView:
@@ -67,7 +75,7 @@ class LiveView:
         wait_s: how long it is waited for at the start (s).
     """
 
-    def __init__(self, url: str, recording_id: str | None = None, wait_s: float = 2.0) -> None:
+    def __init__(self, url: str, recording_id: str | None = None, wait_s: float = 0.5) -> None:
         self._url, self._id, self._wait = url, recording_id, wait_s
 
     def begin(self, stage: Stage) -> None:

@@ -21,7 +21,8 @@ def make_stage(**changed):
     values = {
         "name": "geds", "title": "A stage", "geoms": (make_geom(),), "bodies": ("puck",),
         "robots": ("robot0",), "goal": make_geom(name="goal", body=-1), "arc_lengths": [0, 0.5, 1],
-        "hose_radius": 0.01, "tension_limit": 10.0, "margins": (Margin("stretch 0", "stretch", "N"),),
+        "hose_radius": 0.01, "tension_limit": 10.0,
+        "margins": (Margin("stretch 0", "stretch", "N"),),
         "n_control_points": 4, "low": [0, 0, 0], "high": [1, 1, 0.1], "source": [0, 0, 0],
         "bounds": [[0, 0, -np.inf], [1, 1, np.inf]],
     }  # fmt: skip

@@ -1,10 +1,11 @@
 import json
+import sys
 
 import numpy as np
 import pytest
 
 from hose_mj.recording import rerun
-from hose_mj.recording.rerun import screenshot, write_world_recording
+from hose_mj.recording.rerun import write_world_recording
 from hose_mj.recording.stage import Geom, Stage
 from hose_mj.recording.world_episode import BreakMark, Outcome, SampleBuffer, WorldEpisode
 from tools.cli import main
@@ -58,17 +59,12 @@ def test_a_folder_and_a_time_of_ones_own(recording, shown, tmp_path):
     assert shown == [(recording, png, 0.5)]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a display is taken for granted")
 def test_without_a_display_there_is_one_clear_message(recording, monkeypatch, capsys):
-    monkeypatch.setattr(screenshot, "open_window", _refuse)
     monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert main(["view", str(recording)]) == 2
     assert "--screenshot" in capsys.readouterr().err
-
-
-def _refuse(*_):
-    from hose_mj.errors import HoseError
-
-    raise HoseError("no display; take a picture instead (--screenshot F.png)")
 
 
 def test_what_is_no_recording_is_named(tmp_path, capsys):

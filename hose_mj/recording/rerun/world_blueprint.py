@@ -91,7 +91,7 @@ def _place_eye(stage: Stage) -> rrb.EyeControls3D:
     outward = np.array(_LOOKS[stage.is_planar])
     outward /= np.linalg.norm(outward)
     radius = 0.5 * float(np.linalg.norm(stage.high - stage.low))
-    eye = middle + 1.06 * radius / _HALF_VIEW * outward
+    eye = middle + radius / _HALF_VIEW * outward
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=[0.0, 0.0, 1.0]
     )

@@ -43,7 +43,7 @@ def write_world_recording(
         log_settings(stream, stages, [describe_ending(e.stage, e.outcome) for e in episodes])
         log_scene(stream, stages[0])
         for rank, episode in enumerate(episodes):
-            log = WorldLog(stream, episode.stage, choose_look(episode.stage, rank))
+            log = WorldLog(stream, episode.stage, choose_look(rank))
             log.add(episode.samples)
             log.end(episode.outcome)
         stream.flush()
@@ -95,4 +95,4 @@ def open_log(stream: rr.RecordingStream, stage: Stage) -> WorldLog:
     """Logs what stands still and returns the log of what moves."""
     log_settings(stream, [stage])
     log_scene(stream, stage)
-    return WorldLog(stream, stage, choose_look(stage, 0))
+    return WorldLog(stream, stage, choose_look(0))

@@ -10,7 +10,13 @@ import rerun as rr
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import OTHERS, Rgb, lighten
 from hose_mj.recording.rerun.parts import OUTCOME, TIMELINE, TURNS, make_time
-from hose_mj.recording.rerun.world_stage import Look, force_scale, log_robots, path_of
+from hose_mj.recording.rerun.world_stage import (
+    Look,
+    drawn_radius,
+    log_robots,
+    path_of,
+    scale_forces,
+)
 from hose_mj.recording.stage import Margin, Stage
 from hose_mj.recording.tension import color_tension
 from hose_mj.recording.world_episode import BreakMark, Outcome, Samples
@@ -74,12 +80,12 @@ class WorldLog:
         """Logs what stays the same of entities that change."""
         stage, stream = self._stage, self._stream
         log_robots(stream, stage, self._look)
-        style: dict[str, Any] = {"radii": [stage.hose_radius]}
+        style: dict[str, Any] = {"radii": [drawn_radius(stage)]}
         if self._look.rank:
             style["colors"] = [(*self._look.color, 150)]
         hose = path_of(stage, "hose")
         stream.log(hose, rr.LineStrips3D.from_fields(**style), static=True)
-        points = rr.Points3D.from_fields(radii=[1.5 * stage.hose_radius], colors=[CONTROL_COLOR])
+        points = rr.Points3D.from_fields(radii=[1.5 * drawn_radius(stage)], colors=[CONTROL_COLOR])
         if stage.n_control_points:
             stream.log(path_of(stage, "control_points"), points, static=True)
         arrows = rr.Arrows3D.from_fields(
@@ -99,7 +105,8 @@ class WorldLog:
         for unit, kind in list_kinds(stage):
             lines = [margin for margin in stage.margins if margin.kind == kind]
             share = np.linspace(0.0, 0.55, len(lines))
-            colors = [lighten(KIND_COLORS.get(kind, OTHERS[0]), float(part)) for part in share]
+            base = self._look.tint((*KIND_COLORS.get(kind, OTHERS[0]), 255))[:3]
+            colors = [lighten(base, float(part)) for part in share]
             names = [self._label(margin.name) for margin in lines]
             widths = [1.5] * len(lines)
             style = rr.SeriesLines(colors=colors, names=names, widths=widths)
@@ -107,7 +114,11 @@ class WorldLog:
         for unit in dict.fromkeys(margin.unit for margin in stage.margins):
             style = rr.SeriesLines(colors=[BREAK_COLOR], names=["limit"], widths=[2.5])
             stream.log(self._margin_path(unit, "limit"), style, static=True)
-        reward = rr.SeriesLines(colors=[(120, 200, 120)], names=[self._label("reward")], widths=[2])
+        reward = rr.SeriesLines(
+            colors=[self._look.tint((120, 200, 120, 255))[:3]],
+            names=[self._label("reward")],
+            widths=[2],
+        )
         stream.log(f"plots/{self._name}/reward", reward, static=True)
         owners = rr.StateConfiguration(
             values=list(stage.robots), colors=[LIVELY[i % 4] for i in range(len(stage.robots))]
@@ -150,7 +161,7 @@ class WorldLog:
         places, forces = samples.rows["attachments"], samples.rows["forces"]
         k, n = places.shape[:2]
         columns = rr.Arrows3D.columns(
-            vectors=(force_scale(self._stage) * forces).reshape(-1, 3),
+            vectors=scale_forces(self._stage, forces).reshape(-1, 3),
             origins=places.reshape(-1, 3),
         )
         path = path_of(self._stage, "forces")
@@ -202,7 +213,7 @@ class WorldLog:
         stream, stage = self._stream, self._stage
         stream.set_log_time_enabled(False)
         stream.set_time(TIMELINE, duration=mark.time)
-        top = mark.place + np.array([0.0, 0.0, 0.16 * stage.size])
+        top = mark.place + np.array([0.0, 0.0, (0.16 + 0.06 * self._look.rank) * stage.size])
         ball = rr.Points3D([mark.place], colors=[BREAK_COLOR], radii=[0.014 * stage.size])
         stream.log(path_of(stage, "break"), ball)
         pin = rr.LineStrips3D(

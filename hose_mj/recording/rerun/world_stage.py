@@ -11,7 +11,7 @@ import rerun as rr
 
 from hose_mj.recording.captions import format_table
 from hose_mj.recording.episode import Array
-from hose_mj.recording.palette import Rgb, find_color, mix
+from hose_mj.recording.palette import Rgb, mix
 from hose_mj.recording.rerun.parts import log_document
 from hose_mj.recording.stage import WORLD, Geom, Rgba, Stage
 from hose_mj.recording.tension import make_scale
@@ -19,8 +19,12 @@ from hose_mj.recording.tension import make_scale
 SCENE = "world/scene"
 SCALE = "tension"
 GOAL_COLOR = (60, 200, 110)
+TINTS: tuple[Rgb, ...] = ((255, 255, 255), (0, 190, 170), (225, 110, 200), (110, 150, 255))
+"""Of the overlaid episodes from the second on: none is near a colour of the tension."""
 BOUNDS_COLOR = (150, 165, 185)
 CELL_COLOR = (120, 132, 148)
+_LONGEST_ARROW = 0.3
+"""Of the stage's size: forces that want longer arrows are cut."""
 _PLANE_THICKNESS = 0.004
 """Of the stage's size: a plane is drawn as a thin box whose top it is."""
 
@@ -44,9 +48,9 @@ class Look:
         return (*mix(color[:3], self.color, 0.65), round(0.45 * color[3]))
 
 
-def choose_look(stage: Stage, rank: int) -> Look:
+def choose_look(rank: int) -> Look:
     """Returns the look of the episode at a place in the order in which they are overlaid."""
-    return Look(rank, find_color(stage.name, rank))
+    return Look(rank, TINTS[rank % len(TINTS)])
 
 
 def path_of(stage: Stage, *parts: str) -> str:
@@ -84,6 +88,7 @@ def log_settings(
         shown = {
             "red hose": f"{stage.tension_limit:.4g} N",
             "violet arrow": f"force, {scale * force_scale(stage):.3g} m for {scale:g} N",
+            "longest arrow": f"from {_LONGEST_ARROW * stage.size / force_scale(stage):.3g} N on",
         }
         lines.append(format_table({"model": stage.name, **stage.settings, **shown}))
     log_document(stream, "settings", "\n\n".join(lines))
@@ -91,7 +96,20 @@ def log_settings(
 
 def force_scale(stage: Stage) -> float:
     """Returns the length of a force's arrow over the force (m/N)."""
-    return 0.25 * stage.size / stage.tension_limit
+    return 0.15 * stage.size / stage.tension_limit
+
+
+def scale_forces(stage: Stage, forces: Array) -> Array:
+    """Returns the arrows (..., 3), m, of forces (..., 3), N; no longer than the longest shown."""
+    arrows = force_scale(stage) * forces
+    longest = _LONGEST_ARROW * stage.size
+    lengths = np.linalg.norm(arrows, axis=-1, keepdims=True)
+    return np.asarray(arrows * np.minimum(1.0, longest / np.maximum(lengths, 1e-12)))
+
+
+def drawn_radius(stage: Stage) -> float:
+    """Returns the radius that the hose is drawn with (m): its own, if that can be seen."""
+    return max(stage.hose_radius, 0.003 * stage.size)
 
 
 def log_geom(

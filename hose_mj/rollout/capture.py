@@ -16,7 +16,7 @@ from hose_mj.recording.world_episode import (
     SampleBuffer,
     WorldEpisode,
 )
-from hose_mj.rollout.staging import N_POINTS, Cast, make_stage, read_control_points
+from hose_mj.rollout.staging import N_POINTS, Cast, HoseReader, make_stage
 from hose_mj.world.world import World
 
 CHUNK = 64
@@ -46,6 +46,7 @@ class Capture:
         self._sinks, self._keep, self._most, self._n_points = tuple(sinks), keep, most, n_points
         self.stage: Stage | None = None
         self._cast: Cast | None = None
+        self._reader: HoseReader | None = None
         self._chunk: SampleBuffer | None = None
         self._kept: SampleBuffer | None = None
         self._outcome: Outcome | None = None
@@ -55,6 +56,7 @@ class Capture:
     ) -> None:
         """Begins an episode; nothing is recorded yet but the stage."""
         self.stage, self._cast = make_stage(world, monitor, settings or {}, self._n_points)
+        self._reader = HoseReader(world, self.stage.arc_lengths)
         self._chunk = SampleBuffer(self.stage, CHUNK)
         self._kept = SampleBuffer(self.stage, self._most) if self._keep else None
         self._outcome = None
@@ -70,7 +72,8 @@ class Capture:
             world: the one that the episode started with.
             monitor: likewise.
             info: what else is known, all optional: `reward`, `turn` (a number), `owner` (whose turn
-                it is), `vetoed` and `events` (names).
+                it is), `vetoed` and `events` (names), `margins` (M,), if they have been measured
+                at this state already.
         """
         stage, cast, chunk, info = self.stage, self._cast, self._chunk, info or {}
         assert stage is not None, "start() comes first"
@@ -78,15 +81,19 @@ class Capture:
         assert chunk is not None
         if chunk.is_full:
             self._hand_over()
-        margins = monitor.measure() if monitor is not None else np.zeros(0)
+        assert self._reader is not None
+        control_points, hose = self._reader.read(world)
+        margins = info.get("margins")
+        if margins is None:
+            margins = monitor.measure() if monitor is not None else np.zeros(0)
         numbers = {
             "time": world.time,
             "turn": info.get("turn", NO_TURN),
             "reward": info.get("reward", 0.0),
             "positions": world.data.xpos[cast.bodies],
             "quaternions": world.data.xquat[cast.bodies],
-            "hose": world.position(stage.arc_lengths),
-            "control_points": read_control_points(world),
+            "hose": hose,
+            "control_points": control_points,
             "tension": world.tension(stage.arc_lengths),
             "attachments": world.site_positions(),
             "forces": world.attachment_forces(),

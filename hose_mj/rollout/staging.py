@@ -7,7 +7,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.interpolate import BSpline
 
+from hose_mj.hoses.geds.basis import DEGREE, make_knots
 from hose_mj.hoses.model import Array
 from hose_mj.recording.stage import WORLD, Geom, Margin, Rgba, Stage
 from hose_mj.world.geds_world import GedsWorld
@@ -141,6 +143,32 @@ def read_control_points(world: World) -> Array:
     if isinstance(world, GedsWorld):
         return world.hose.control_points
     return world.position(world.centre_line().arc_lengths)
+
+
+class HoseReader:
+    """Reads where the hose is, at the same arc lengths again and again.
+
+    A spline hose is linear in its control points: a product replaces the search of its basis.
+
+    Args:
+        world: whose hose it is.
+        arc_lengths: rising (P,), m.
+    """
+
+    def __init__(self, world: World, arc_lengths: Array) -> None:
+        self._arc_lengths = arc_lengths
+        self._basis: Array | None = None
+        if isinstance(world, GedsWorld):
+            n = len(world.hose.control_points)
+            knots = make_knots(n, world.scene.spec.length)
+            self._basis = BSpline.design_matrix(arc_lengths, knots, DEGREE).toarray()
+
+    def read(self, world: World) -> tuple[Array, Array]:
+        """Returns control points (C, 3) and places at the arc lengths (P, 3), m."""
+        points = read_control_points(world)
+        if self._basis is not None:
+            return points, self._basis @ points
+        return points, world.position(self._arc_lengths)
 
 
 def find_space(world: World, geoms: tuple[Geom, ...]) -> tuple[Array, Array]:

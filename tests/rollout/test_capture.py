@@ -19,7 +19,8 @@ from hose_mj.recording.rerun.live import check_url
 from hose_mj.recording.rerun.world_stage import rotate
 from hose_mj.recording.world_table import write_csv
 from hose_mj.rollout.capture import Capture
-from hose_mj.rollout.staging import Cast, make_stage
+from hose_mj.rollout.staging import Cast, HoseReader, make_stage
+from hose_mj.world.registry import make_world
 
 N_SAMPLES = 30
 
@@ -204,3 +205,24 @@ def test_a_screenshot_shows_hose_and_break(recording, tmp_path):
     for color in ([214, 30, 40], [176, 186, 196], [255, 40, 50]):  # taut hose, floor, break
         near = np.all(np.abs(views - np.array(color) / 255.0) < 0.1, axis=-1)
         assert near.sum() > 15, color
+
+
+def test_a_spline_hose_is_read_as_the_world_says(floor):
+    world = make_world(floor)
+    world.control[:] = [5.0, -3.0, 2.0, 4.0]
+    world.step(50)
+    arc_lengths = np.linspace(0.0, floor.spec.length, 33)
+    control_points, hose = HoseReader(world, arc_lengths).read(world)
+    np.testing.assert_allclose(hose, world.position(arc_lengths), atol=1e-12)
+    np.testing.assert_allclose(control_points[[0, -1]], hose[[0, -1]], atol=1e-12)  # open knots
+    assert not np.allclose(hose, make_world(floor).position(arc_lengths))
+
+
+def test_margins_that_are_known_are_not_measured_again(world, monitor):
+    capture = Capture(keep=True)
+    capture.start(world, monitor)
+    monitor.measure = lambda: pytest.fail("measured")
+    capture.sample(world, monitor, {"margins": np.array([7.0, np.inf])})
+    capture.finish()
+    margins = capture.episode().samples.rows["margins"]
+    np.testing.assert_array_equal(margins, [[7.0, np.nan]])

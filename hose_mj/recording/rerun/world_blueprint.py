@@ -30,6 +30,7 @@ def make_world_blueprint(stages: Sequence[Stage], follow: bool = False) -> rrb.B
     """
     stage = stages[0]
     contents = ["/world/**"]
+    unnamed = [*contents, *(f"- /{path_of(one, 'names')}" for one in stages)]
     hidden = {
         f"/{path_of(one, 'control_points')}": rrb.EntityBehavior(visible=False)
         for one in stages
@@ -37,7 +38,7 @@ def make_world_blueprint(stages: Sequence[Stage], follow: bool = False) -> rrb.B
     }
     views = rrb.Horizontal(
         _make_view(stage, "In space", contents, hidden, _place_eye(stage)),
-        _make_view(stage, "From above", contents, hidden, _place_top(stage)),
+        _make_view(stage, "From above", unnamed, hidden, _place_top(stage)),
         column_shares=[1.35, 1.0],
     )
     left = rrb.Vertical(views, _make_scale(stage), _make_plots(stages), row_shares=[3.4, 0.5, 1.5])

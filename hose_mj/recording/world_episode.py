@@ -155,7 +155,7 @@ class SampleBuffer:
         if most < 2:
             raise InputError("most", most, "a whole number, at least 2")
         self._type, self._most = make_row_type(stage), most
-        self._rows = np.zeros(min(64, most), self._type)
+        self._grow(min(64, most))
         self._texts: list[tuple[str, str, str]] = []
         self._stride, self._seen = 1, 0
 
@@ -183,9 +183,9 @@ class SampleBuffer:
             self._texts.pop()
         self._make_room()
         self._seen += 1
-        row = self._rows[len(self)]
+        k = len(self)
         for name, value in numbers.items():
-            row[name] = value
+            self._fields[name][k] = value
         self._texts.append((owner, vetoed, event))
 
     def extend(self, samples: Samples) -> None:
@@ -198,7 +198,9 @@ class SampleBuffer:
     def copy(self) -> Samples:
         """Returns the samples so far; at least one must be there."""
         owners, vetoed, events = (tuple(texts) for texts in zip(*self._texts, strict=True))
-        return Samples(self._rows[: len(self)].copy(), owners, vetoed, events)
+        rows = self._rows[: len(self)].copy()
+        rows["margins"][~np.isfinite(rows["margins"])] = np.nan
+        return Samples(rows, owners, vetoed, events)
 
     def take(self) -> Samples:
         """Returns the samples so far and forgets them."""
@@ -214,6 +216,10 @@ class SampleBuffer:
             self._texts = self._texts[::2]
             self._stride *= 2
         if len(self) == len(self._rows):
-            grown = np.zeros(min(2 * len(self._rows), self._most), self._type)
-            grown[: len(self)] = self._rows
-            self._rows = grown
+            rows = self._rows
+            self._grow(min(2 * len(rows), self._most))
+            self._rows[: len(rows)] = rows
+
+    def _grow(self, length: int) -> None:
+        self._rows = np.zeros(length, self._type)
+        self._fields = {name: self._rows[name] for name in self._type.names or ()}

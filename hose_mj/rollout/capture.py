@@ -97,7 +97,7 @@ class Capture:
             "tension": world.tension(stage.arc_lengths),
             "attachments": world.site_positions(),
             "forces": world.attachment_forces(),
-            "margins": np.where(np.isfinite(margins), margins, np.nan),
+            "margins": margins,
         }
         vetoed, events = ", ".join(info.get("vetoed", ())), ", ".join(info.get("events", ()))
         chunk.append(info.get("owner", "") or "", vetoed, events, **numbers)

@@ -136,7 +136,7 @@ def _check_attachments(
     given: Sequence[float] | None, n: int, length: float, file: str
 ) -> tuple[float, ...]:
     if given is None:
-        return tuple(length * (n - i) / n for i in range(n))
+        return tuple(length * ((n - i) / n) for i in range(n))
     ends = (*given, 0.0)
     falls = all(a > b for a, b in pairwise(ends))
     if len(given) != n or not falls or given[0] > length:

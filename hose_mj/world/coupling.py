@@ -28,8 +28,11 @@ class Bodies:
         self._model, self._data, self._sites = model, data, [int(site) for site in sites]
         self._scratch = mujoco.MjData(model)
         nv = model.nv
-        self._jacobian = np.zeros((3 * len(sites), nv))
-        self._rows = [self._jacobian[3 * i : 3 * i + 3] for i in range(len(sites))]
+        self._jacobian, self._last = np.zeros((2, 3 * len(sites), nv))
+        self._rows, self._last_rows = (
+            [matrix[3 * i : 3 * i + 3] for i in range(len(sites))]
+            for matrix in (self._jacobian, self._last)
+        )
         self._mass, self._identity = np.zeros((nv, nv)), np.eye(nv)
         self._user = np.zeros(nv)
         self._kept: list[tuple[Array, Array]] = []
@@ -78,10 +81,13 @@ class Bodies:
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
 
-    def find_compliance(self, in_contact: bool) -> Array:
+    def find_compliance(self, in_contact: bool, is_exact: bool) -> Array:
         """By how much F (N) moves the sites against it within the step, (3 k, 3 k), m/N.
 
         Args:
+            is_exact: True for the derivative at the last step tried: forces act on the pose at the
+                beginning of the step and are seen on that at its end, so it is not symmetric where
+                bodies turn. False for the symmetric one without the turn, which every step can do.
             in_contact: whether contacts, limits and other constraints of the last step tried go on
                 to act, and give way as MuJoCo lets them; else as if there were none.
         """
@@ -98,5 +104,11 @@ class Bodies:
                 stiffness = rows.T @ (np.asarray(data.efc_D)[active, None] * rows)
                 gone = np.linalg.solve(self._mass + stiffness, moved)
                 moved = moved - stiffness @ gone
-        answer = self._jacobian @ np.linalg.solve(damped, moved)
-        return np.asarray(dt * dt * 0.5 * (answer + answer.T))
+        answer = np.linalg.solve(damped, moved)
+        if not is_exact:
+            answer = self._jacobian @ answer
+            return np.asarray(dt * dt * 0.5 * (answer + answer.T))
+        mujoco.mj_comPos(model, self._scratch)
+        for row, site in zip(self._last_rows, self._sites, strict=True):
+            mujoco.mj_jacSite(model, self._scratch, row, None, site)
+        return np.asarray(dt * dt * self._last @ answer)

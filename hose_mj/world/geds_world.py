@@ -7,7 +7,8 @@ same impulses.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.model import Array, Hold
 from hose_mj.scenes.mjcf import Scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.coupling import Bodies
@@ -111,6 +112,9 @@ class GedsWorld(World):
         self._start_bodies()
         even = np.linspace(0.0, self.scene.spec.length, N_POINTS)
         self.hose.reset(lambda s: np.stack([np.interp(s, even, x) for x in self._start.T], axis=1))
+        gaps = self.site_positions() - self.hose.position(self.arc_lengths)
+        rows = self.hose.attachment_jacobian(self.arc_lengths).T
+        self.hose.set_control_points(self.hose.control_points + np.linalg.pinv(rows) @ gaps)
         self._holds = [
             self.hose.attach(float(s), place)
             for s, place in zip(self.arc_lengths, self.site_positions(), strict=True)
@@ -171,22 +175,8 @@ class GedsWorld(World):
         self._touch.push(self.data.qfrc_applied)
         bodies.begin()
         self._touch.measure()
-        forces = np.zeros((len(held), 3))
-        reached = bodies.try_step(forces)
-        in_contact, before = True, np.inf
         try:
-            for _ in range(MOST_SWEEPS):
-                give = bodies.find_compliance(in_contact)
-                aim = reached + (give @ forces.ravel()).reshape(-1, 3)
-                forces = hose.try_step(held, aim, give)
-                self.sweeps += 1
-                reached = bodies.try_step(forces)
-                gap = float(np.abs(reached - hose.find_held_positions()).max())
-                if gap < GAP:
-                    break
-                if gap > before / _SLOW:
-                    in_contact = not in_contact
-                before = gap
+            self._meet(held)
         except StepError:
             bodies.take_back()
             raise
@@ -199,3 +189,53 @@ class GedsWorld(World):
         hose.keep_step()
         bodies.end()
         self._touch.update()
+
+    def _meet(self, held: Sequence[Hold]) -> None:
+        """Finds the forces under which the steps of hose and bodies end with both together.
+
+        Each sweep solves the hose for a linear answer of the bodies. Where the symmetric one leaves
+        a gap, Newton's closes it; where contacts open or close, the answer without them may.
+        """
+        bodies, hose = self._bodies, self.hose
+        forces = np.zeros((len(held), 3))
+        reached = bodies.try_step(forces)
+        best = _Meeting(np.inf, forces, reached, reached, np.zeros((0, 0)))
+        in_contact, is_exact, may_be_exact = True, False, True
+        for _ in range(MOST_SWEEPS):
+            give = bodies.find_compliance(in_contact, is_exact)
+            aim = reached + (give @ forces.ravel()).reshape(-1, 3)
+            try:
+                found = hose.try_step(held, aim, give)
+            except StepError:
+                if not is_exact:
+                    raise
+                is_exact = may_be_exact = False
+                continue
+            self.sweeps += 1
+            moved = bodies.try_step(found)
+            gap = float(np.abs(moved - hose.find_held_positions()).max())
+            is_slow = gap > best.gap / _SLOW
+            if gap < best.gap:
+                best = _Meeting(gap, found, moved, aim, give)
+            if gap < GAP:
+                return
+            if is_slow and is_exact:
+                may_be_exact = False
+            elif is_slow:
+                in_contact = not in_contact
+            is_exact = may_be_exact
+            if gap > best.gap:
+                bodies.try_step(best.forces)
+            forces, reached = best.forces, best.reached
+        hose.try_step(held, best.aim, best.give)
+        bodies.try_step(best.forces)
+
+
+class _Meeting(NamedTuple):
+    """How near hose and bodies have come (m), with which forces, for which answer of the bodies."""
+
+    gap: float
+    forces: Array
+    reached: Array
+    aim: Array
+    give: Array

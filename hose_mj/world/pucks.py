@@ -126,6 +126,7 @@ class Pucks:
         """
         world, masses, touch = self._world, self._masses, self._touch
         data = world.data
+        world.check_control()
         masses.position[:] = data.site_xpos[self._sites]
         masses.velocity[self._at] = self._signs * data.qvel
         masses.force[self._at] = self._signs * (self._constant + self._find_motor_forces())

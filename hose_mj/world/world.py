@@ -146,6 +146,11 @@ class World(ABC):
             raise InputError("robot", robot, f"0 (tip) to {self.n_robots - 1}")
         self.robot_forces[robot] = check_vector("force", force)
 
+    def check_control(self) -> None:
+        """Raises `InputError` for a control that is not finite."""
+        if not np.isfinite(self.control).all():
+            raise InputError("control", self.control.tolist(), "finite numbers")
+
     # -- state -------------------------------------------------------------------------------------
 
     def snapshot(self) -> dict[str, Any]:
@@ -192,6 +197,7 @@ class World(ABC):
 
     def _write_inputs(self) -> None:
         """Hands controls and the user's forces to MuJoCo."""
+        self.check_control()
         self.data.ctrl[:] = self.control
         self.data.qfrc_applied[:] = 0.0
         if np.any(self.robot_forces):

@@ -52,7 +52,7 @@ class Carried:
             positions: where each would be at the end of the step if the hose did not pull at it,
                 (k, 3), m.
             compliance: by how much a mean force on the hose over the step moves them against it,
-                (3 k, 3 k), symmetric, m/N.
+                (3 k, 3 k), m/N.
 
         Returns:
             the mean force of each hold on the hose over the step, (k, 3), N. Its sum over all holds

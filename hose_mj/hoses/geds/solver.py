@@ -69,7 +69,7 @@ class Response(NamedTuple):
     after - compliance F. A stage knows F as base + share lambda, where lambda are its multipliers.
 
     Attributes:
-        compliance: (m, m) over all rows, m/N; (0, 0) where nothing gives way.
+        compliance: (m, m) over all rows, m/N, not always symmetric; (0, 0) where nothing gives way.
         base: (m,), N, written.
         share: (1,), written.
         gathered: sum of the multipliers of the stages, or parts of a step, before, (m,), written.
@@ -417,12 +417,13 @@ def solve_with_holds(axes, holds, give, softness, n_negative, size, work):  # ty
                 for k in range(size):
                     product += z[row, k] * z[other, k]
             work.schur[row, other] = product
-        if row < len(holds.response.compliance):
-            for other in range(row + 1):
-                work.schur[row, other] += give * holds.response.compliance[row, other]
         if row >= n_holds:
             work.schur[row, row] += softness * twist.compliance[row - n_holds]
-    n_found = _solve_dense(m, work.schur, work.multipliers)
+    if len(holds.response.compliance) > 0:
+        _add_compliance(m, give, holds.response.compliance, work.schur)
+        n_found = n_negative if _solve_general(m, work.schur, work.multipliers) else -1
+    else:
+        n_found = _solve_dense(m, work.schur, work.multipliers)
     if n_found != n_negative:
         return DEPENDENT_HOLDS if n_found < 0 else NOT_POSITIVE
     for k in range(size):
@@ -435,6 +436,39 @@ def solve_with_holds(axes, holds, give, softness, n_negative, size, work):  # ty
         work.gradient[k] = 0.0
     solve_upper(axes, size, work.band, work.gradient)
     return DONE
+
+
+@kernel
+def _add_compliance(m, give, compliance, matrix):  # type: ignore[no-untyped-def]
+    """Completes a symmetric matrix of m rows from its lower half and adds `give` compliance."""
+    for row in range(m):
+        for other in range(row):
+            matrix[other, row] = matrix[row, other]
+    for row in range(len(compliance)):
+        for other in range(len(compliance)):
+            matrix[row, other] += give * compliance[row, other]
+
+
+@kernel
+def _solve_general(m, matrix, rhs):  # type: ignore[no-untyped-def]
+    """Solves in place by L U without exchanges, as a matrix with a positive symmetric part allows.
+
+    Returns whether it could.
+    """
+    for j in range(m):
+        pivot = matrix[j, j]
+        if not abs(pivot) > 0.0:
+            return False
+        for i in range(j + 1, m):
+            factor = matrix[i, j] / pivot
+            for k in range(j + 1, m):
+                matrix[i, k] -= factor * matrix[j, k]
+            rhs[i] -= factor * rhs[j]
+    for j in range(m - 1, -1, -1):
+        for k in range(j + 1, m):
+            rhs[j] -= matrix[j, k] * rhs[k]
+        rhs[j] /= matrix[j, j]
+    return True
 
 
 @kernel

@@ -186,7 +186,7 @@ def test_reactions_are_opposite_to_what_the_hose_feels(plane):
     gradient, _, touching = add(spline, contacts, x, rate, rate, STEP, False)
     assert touching > 3
     reactions = contacts.compute_reactions(x, rate)
-    on_obstacles = sum(reaction.force for reaction in reactions)
+    on_obstacles = reactions[:, :3].sum(axis=0)
     on_points = spline.to_world(-gradient)
     assert np.linalg.norm(on_obstacles) > 1.0
     np.testing.assert_allclose(on_points.sum(axis=0)[dims], -on_obstacles[dims], rtol=1e-12)
@@ -195,8 +195,8 @@ def test_reactions_are_opposite_to_what_the_hose_feels(plane):
     # Moments about the world's origin, each obstacle's from its own position.
     places = spline.to_world(x)
     about = sum(
-        reaction.moment + np.cross(obstacle.position, reaction.force)
-        for reaction, obstacle in zip(reactions, obstacles, strict=True)
+        row[3:] + np.cross(obstacle.position, row[:3])
+        for row, obstacle in zip(reactions, obstacles, strict=True)
     )
     spots = spline.evaluate(contacts.arc_lengths, x)
     np.testing.assert_allclose(np.cross(spots, forces).sum(axis=0), -about, rtol=1e-10, atol=1e-12)

@@ -54,6 +54,7 @@ COMMANDS = {
     "rollout": Command("tools.rollout", "run an episode of a policy in a scene with a hose"),
     "train": Command("tools.train", "train a learner on a task, test it and keep what it learned"),
     "transfer": Command("tools.transfer", "start on a task from what was learned on a simpler one"),
+    "view": Command("tools.view", "open a recording at the moment of the break"),
 }
 
 

@@ -22,9 +22,14 @@ def name_quantity(unit: str) -> str:
 
 
 def format_settings(settings: dict[str, str]) -> str:
+    """Returns the settings as a Markdown table under a heading."""
+    return f"# Settings\n\n{format_table(settings)}"
+
+
+def format_table(settings: dict[str, str]) -> str:
     """Returns the settings as a Markdown table."""
     rows = [f"| {_cell(name)} | {_cell(value)} |" for name, value in settings.items()]
-    return "\n".join(["# Settings", "", "| setting | value |", "|---|---|", *rows])
+    return "\n".join(["| setting | value |", "|---|---|", *rows])
 
 
 def format_legend(scene: Scene) -> str:

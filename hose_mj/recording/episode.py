@@ -43,14 +43,14 @@ class HoseTrack:
     def __post_init__(self) -> None:
         what = f"track {self.name!r}"
         check_name("name of a track", self.name)
-        arc_lengths = _lock(self, "arc_lengths", what)
+        arc_lengths = lock_array(self, "arc_lengths", what)
         check_rising(f"{what}: arc_lengths", arc_lengths, at_least=2)
-        times = _lock(self, "times", what)
+        times = lock_array(self, "times", what)
         check_rising(f"{what}: times", times)
         shape = (len(times), len(arc_lengths))
-        check_shape(f"{what}: points", _lock(self, "points", what), (*shape, 3))
+        check_shape(f"{what}: points", lock_array(self, "points", what), (*shape, 3))
         if self.tension is not None:
-            check_shape(f"{what}: tension", _lock(self, "tension", what), shape)
+            check_shape(f"{what}: tension", lock_array(self, "tension", what), shape)
         if not (np.isfinite(self.radius) and self.radius > 0.0):
             raise InputError(f"{what}: radius", self.radius, "a finite number above 0 (m)")
         check_color(what, self.color)
@@ -80,9 +80,9 @@ class Series:
     def __post_init__(self) -> None:
         what = f"series {self.name!r}"
         check_name("name of a series", self.name)
-        times = _lock(self, "times", what)
+        times = lock_array(self, "times", what)
         check_rising(f"{what}: times", times)
-        check_shape(f"{what}: values", _lock(self, "values", what), (len(times),))
+        check_shape(f"{what}: values", lock_array(self, "values", what), (len(times),))
         if self.limit is not None and not np.isfinite(self.limit):
             raise InputError(f"{what}: limit", self.limit, "a finite number or None")
         if self.color is not None:
@@ -156,7 +156,7 @@ def check_color(what: str, color: Rgb) -> None:
         raise InputError(f"{what}: color", color, "three integers, 0 to 255")
 
 
-def _lock(owner: object, field: str, what: str) -> Array:
+def lock_array(owner: object, field: str, what: str) -> Array:
     """Replaces a field of a frozen dataclass by a read-only float64 copy; refuses NaN, infinity."""
     value: ArrayLike = getattr(owner, field)
     try:

@@ -75,6 +75,37 @@ def start_viewer(size: tuple[int, int]) -> Iterator[Viewer]:
             stop(process)
 
 
+def open_window(*files: Path) -> str:
+    """Opens a viewer's window that outlives this process; returns the URL that it listens at.
+
+    Args:
+        files: recordings to show.
+
+    Raises:
+        HoseError: there is no display.
+    """
+    if not has_display():
+        raise HoseError(
+            "there is no display to open the viewer's window on; take a picture instead "
+            "(--screenshot F.png), or save a recording (--save F.rrd) and open it elsewhere"
+        )
+    port = find_free_port()
+    subprocess.Popen(
+        [sys.executable, "-m", "rerun_cli", "--bind", _HOST, "--port", str(port), *map(str, files)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    return f"rerun+http://{_HOST}:{port}/proxy"
+
+
+def has_display() -> bool:
+    """Whether a window can be opened; taken for granted where X11 and Wayland are not usual."""
+    named = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
+    return bool(named) or not sys.platform.startswith("linux")
+
+
 def make_command(port: int, size: tuple[int, int]) -> list[str]:
     """Returns the command line of a viewer without window, welcome screen or saved state."""
     return [

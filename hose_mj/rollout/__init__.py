@@ -1,1 +1,1 @@
-"""Episodes in worlds: policies that act in them, and what watches."""
+"""Episodes in worlds: policies that act in them, what watches and records."""

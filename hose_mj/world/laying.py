@@ -39,9 +39,10 @@ def relax_hose(
 ) -> GedsHose:
     """Returns a hose at rest that is held at its attachments and lies on what is below it.
 
-    Between neighbours it starts as an arc of a circle or as waves to the side, or hanging: clear of
-    obstacles, without crossing itself, without a kink, in this order, as far as there is such a
-    shape. Then it moves through a viscous medium until it has found its place. All hose models start from this shape.
+    Between neighbours it starts as an arc of a circle or as waves to the side, or hanging: the
+    first of these that is clear of obstacles and does not cross what is there of the hose. Then it
+    moves through a viscous medium until it has found its place. All hose models start from this
+    shape.
 
     Args:
         spec: the hose.
@@ -113,17 +114,14 @@ def _draw(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
 def _judge(hose: GedsHose, arc_lengths: Array, points: Array, earlier: Array) -> float:
     """How little points (k, 3), m, suit as the next part of a hose after points before (j, 3).
 
-    What it would stand in counts most, what it would cross of itself next, last the kink.
+    What it would stand in counts, then whether it would cross itself.
     """
     radius = hose.spec.radius
     cost = 1e3 * (0.99 * radius - _find_clearance(hose, arc_lengths, points)) / radius
-    if len(earlier) < 2:
-        return cost
     apart = np.linalg.norm(points[None, _NEAR:] - earlier[:-_NEAR, None], axis=2)
     if apart.min(initial=np.inf) < 2.0 * radius:
         cost += 10.0
-    before, after = earlier[-1] - earlier[-2], points[1] - points[0]
-    return cost - float(before @ after) / float(np.linalg.norm(before) * np.linalg.norm(after))
+    return cost
 
 
 def _find_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:

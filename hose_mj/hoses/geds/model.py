@@ -111,6 +111,11 @@ class GedsHose(Carried, Touching, SplineBody):
         """Simulated time since the last reset (s)."""
         return self._steps * self._timestep
 
+    @property
+    def control_points(self) -> Array:
+        """Control points of the spline now, (n, 3), m."""
+        return self._spline.to_world(self._state.x) + self._spline.offset
+
     def reset(
         self, curve: Curve, velocity: Curve | None = None, director: ArrayLike | None = None
     ) -> None:

@@ -1,0 +1,234 @@
+"""The stage of an episode as Rerun entities: geoms, goal, bounds, the scale of the tension."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from hose_mj.recording.captions import format_table
+from hose_mj.recording.episode import Array
+from hose_mj.recording.palette import Rgb, mix
+from hose_mj.recording.rerun.parts import log_document
+from hose_mj.recording.stage import WORLD, Geom, Rgba, Stage
+from hose_mj.recording.tension import make_scale
+
+SCENE = "world/scene"
+SCALE = "tension"
+GOAL_COLOR = (60, 200, 110)
+TINTS: tuple[Rgb, ...] = ((255, 255, 255), (0, 190, 170), (225, 110, 200), (110, 150, 255))
+"""Of the overlaid episodes from the second on: none is near a colour of the tension."""
+BOUNDS_COLOR = (150, 165, 185)
+CELL_COLOR = (120, 132, 148)
+_LONGEST_ARROW = 0.3
+"""Of the stage's size: forces that want longer arrows are cut."""
+_PLANE_THICKNESS = 0.004
+"""Of the stage's size: a plane is drawn as a thin box whose top it is."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How one of several overlaid episodes is told apart.
+
+    Attributes:
+        rank: 0 for the first, in the scene's own colours; the others are tinted and see-through.
+        color: of the tint.
+    """
+
+    rank: int
+    color: Rgb
+
+    def tint(self, color: Rgba) -> Rgba:
+        """Returns the colour to draw a robot's geom in."""
+        if not self.rank:
+            return color
+        return (*mix(color[:3], self.color, 0.65), round(0.45 * color[3]))
+
+
+def choose_look(rank: int) -> Look:
+    """Returns the look of the episode at a place in the order in which they are overlaid."""
+    return Look(rank, TINTS[rank % len(TINTS)])
+
+
+def path_of(stage: Stage, *parts: str) -> str:
+    """Returns the entity path of what belongs to one episode's part of the world."""
+    return "/".join(["world", *map(rr.escape_entity_path_part, (stage.name, *parts))])
+
+
+def log_scene(stream: rr.RecordingStream, stage: Stage) -> None:
+    """Logs what stands still, once for all overlaid episodes."""
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    for geom in stage.geoms:
+        if geom.body == WORLD:
+            log_geom(stream, f"{SCENE}/{rr.escape_entity_path_part(geom.name)}", geom, stage)
+    _log_goal(stream, stage)
+    _log_bounds(stream, stage)
+    _log_cells(stream, stage)
+    _log_scale(stream, stage)
+
+
+def log_robots(stream: rr.RecordingStream, stage: Stage, look: Look) -> None:
+    """Logs the shapes of the bodies that move, under the entities that their poses go to."""
+    for geom in stage.geoms:
+        if geom.body != WORLD:
+            path = path_of(stage, "robots", stage.bodies[geom.body], geom.name)
+            log_geom(stream, path, geom, stage, look)
+
+
+def log_settings(
+    stream: rr.RecordingStream, stages: Sequence[Stage], endings: Sequence[str] = ()
+) -> None:
+    """Logs how the episodes ended, their settings and what the picture's colours mean."""
+    lines = [f"# {stages[0].title}", *endings]
+    for stage in stages:
+        scale = 10.0 ** np.floor(np.log10(stage.tension_limit))
+        shown = {
+            "red hose": f"{stage.tension_limit:.4g} N",
+            "violet arrow": f"force, {scale * force_scale(stage):.3g} m for {scale:g} N",
+            "longest arrow": f"from {_LONGEST_ARROW * stage.size / force_scale(stage):.3g} N on",
+        }
+        lines.append(format_table({"model": stage.name, **stage.settings, **shown}))
+    log_document(stream, "settings", "\n\n".join(lines))
+
+
+def force_scale(stage: Stage) -> float:
+    """Returns the length of a force's arrow over the force (m/N)."""
+    return 0.15 * stage.size / stage.tension_limit
+
+
+def scale_forces(stage: Stage, forces: Array) -> Array:
+    """Returns the arrows (..., 3), m, of forces (..., 3), N; no longer than the longest shown."""
+    arrows = force_scale(stage) * forces
+    longest = _LONGEST_ARROW * stage.size
+    lengths = np.linalg.norm(arrows, axis=-1, keepdims=True)
+    return np.asarray(arrows * np.minimum(1.0, longest / np.maximum(lengths, 1e-12)))
+
+
+def drawn_radius(stage: Stage) -> float:
+    """Returns the radius that the hose is drawn with (m): its own, if that can be seen."""
+    return max(stage.hose_radius, 0.003 * stage.size)
+
+
+def log_geom(
+    stream: rr.RecordingStream, path: str, geom: Geom, stage: Stage, look: Look | None = None
+) -> None:
+    """Logs a shape once, filled, in its frame."""
+    color = geom.color if look is None else look.tint(geom.color)
+    stream.log(path, make_shape(geom, stage, color), static=True)
+
+
+def make_shape(geom: Geom, stage: Stage, color: Rgba) -> Any:
+    """Returns the archetype of a shape."""
+    x, y, z, w = np.roll(geom.quaternion, -1)
+    turn: Any = [rr.Quaternion(xyzw=[x, y, z, w])]
+    filled: dict[str, Any] = {"colors": [color], "fill_mode": "solid"}
+    radius, half = geom.size[0], geom.size[1]
+    place: dict[str, Any] = {"centers": [geom.position], "quaternions": turn}
+    if geom.kind == "plane":
+        return _make_plane(geom, stage, turn, filled)
+    if geom.kind == "box":
+        return rr.Boxes3D(half_sizes=[geom.size], **place, **filled)
+    if geom.kind in ("sphere", "ellipsoid"):
+        sizes = [geom.size] if geom.kind == "ellipsoid" else [[radius] * 3]
+        return rr.Ellipsoids3D(half_sizes=sizes, **place, **filled)
+    if geom.kind == "cylinder":
+        return rr.Cylinders3D(lengths=[2.0 * half], radii=[radius], **place, **filled)
+    if geom.kind == "capsule":
+        start = geom.position - rotate(geom.quaternion, np.array([0.0, 0.0, half]))
+        place = {"translations": [start], "quaternions": turn}
+        return rr.Capsules3D(lengths=[2.0 * half], radii=[radius], **place, **filled)
+    return _make_mesh(geom, color)
+
+
+def _make_plane(geom: Geom, stage: Stage, turn: Any, filled: Any) -> rr.Boxes3D:
+    """A plane ends where the stage does, if it has no end of its own."""
+    thickness = _PLANE_THICKNESS * stage.size
+    ends = np.where(geom.size[:2] > 0.0, geom.size[:2], 0.75 * stage.size)
+    center = geom.position - rotate(geom.quaternion, np.array([0.0, 0.0, 0.5 * thickness]))
+    sizes = [[*ends, 0.5 * thickness]]
+    return rr.Boxes3D(half_sizes=sizes, centers=[center], quaternions=turn, **filled)
+
+
+def _make_mesh(geom: Geom, color: Rgba) -> rr.Mesh3D:
+    assert geom.vertices is not None
+    assert geom.faces is not None
+    vertices = geom.position + rotate(geom.quaternion, geom.vertices)
+    corners = vertices[geom.faces.astype(int)]  # flat faces: each triangle has its own vertices
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    return rr.Mesh3D(
+        vertex_positions=corners.reshape(-1, 3),
+        vertex_normals=np.repeat(normals, 3, axis=0),
+        albedo_factor=color,
+    )
+
+
+def rotate(quaternion: Array, vectors: Array) -> Array:
+    """Turns vectors (..., 3) by a unit quaternion w, x, y, z."""
+    w, axis = quaternion[0], quaternion[1:]
+    crossed = np.cross(axis, vectors)
+    return np.asarray(vectors + 2.0 * (w * crossed + np.cross(axis, crossed)))
+
+
+def _log_goal(stream: rr.RecordingStream, stage: Stage) -> None:
+    log_geom(stream, f"{SCENE}/goal", stage.goal, stage)
+    label = rr.Points3D(
+        [stage.goal.position], labels=["goal"], radii=0.0, colors=[GOAL_COLOR], show_labels=True
+    )
+    stream.log(f"{SCENE}/goal/label", label, static=True)
+
+
+def _log_bounds(stream: rr.RecordingStream, stage: Stage) -> None:
+    """A rectangle where there is no bound upwards, a box where there is one."""
+    finite = np.isfinite(stage.bounds)
+    if not finite[:, :2].all():
+        return
+    low, high = stage.bounds
+    lift = 0.002 * stage.size
+    levels = stage.bounds[:, 2] if finite[:, 2].all() else np.array([stage.ground + lift])
+    ring = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    rings = [np.column_stack([np.vstack([ring, ring[:1]]), np.full(5, z)]) for z in levels]
+    posts = [[[*corner, levels[0]], [*corner, levels[-1]]] for corner in ring]
+    strips: list[Any] = [*rings, *(posts if len(levels) > 1 else ())]
+    lines = rr.LineStrips3D(strips, colors=[BOUNDS_COLOR], radii=[0.0015 * stage.size])
+    stream.log(f"{SCENE}/bounds", lines, static=True)
+
+
+def _log_cells(stream: rr.RecordingStream, stage: Stage) -> None:
+    """The cells of the ground, centred on the source, as far as the bounds reach."""
+    low, high = stage.bounds[:, :2]
+    if not (stage.cell and np.all(np.isfinite(stage.bounds[:, :2]))):
+        return
+    z = stage.ground + 0.001 * stage.size
+    strips = []
+    for axis in (0, 1):
+        first = stage.source[axis] + stage.cell * (
+            0.5 + np.ceil((low[axis] - stage.source[axis]) / stage.cell - 0.5 - 1e-9)
+        )
+        for place in np.arange(first, high[axis] + 1e-9, stage.cell):
+            ends = np.array([[*low, z], [*high, z]])
+            ends[:, axis] = place
+            strips.append(ends)
+    lines = rr.LineStrips3D(strips, colors=[CELL_COLOR], radii=[0.0006 * stage.size])
+    stream.log(f"{SCENE}/cells", lines, static=True)
+
+
+def _log_scale(stream: rr.RecordingStream, stage: Stage) -> None:
+    """A bar of the colours with tensions below it; the view counts rows down."""
+    colors, tensions = make_scale(stage.tension_limit)
+    height, width = 10, len(colors)
+    stream.log(SCALE, rr.Image(np.repeat(colors[None], height, axis=0)), static=True)
+    low, high = tensions[0], tensions[-1]
+    places = width * (tensions - low) / (high - low)
+    labels = [f"{tension:.3g} N" for tension in tensions]
+    ticks = rr.Points2D(
+        np.column_stack([places, np.full(len(places), height + 7.0)]),
+        labels=labels,
+        radii=0.0,
+        colors=[(200, 206, 214)],
+        show_labels=True,
+    )
+    stream.log(f"{SCALE}/ticks", ticks, static=True)

@@ -1,0 +1,179 @@
+"""The stage of an episode in a world: everything that is to be seen and does not change.
+
+Plain data in the world frame, SI units. Quaternions are w, x, y, z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hose_mj.errors import InputError
+from hose_mj.recording.episode import (
+    Array,
+    check_name,
+    check_rising,
+    check_shape,
+    check_unique,
+    lock_array,
+)
+
+GEOM_KINDS = ("plane", "box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh")
+WORLD = -1
+"""Body of what does not move."""
+Rgba = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Geom:
+    """One shape, in the frame of a body.
+
+    Attributes:
+        name: unique on its stage.
+        kind: one of `GEOM_KINDS`.
+        size: as MuJoCo has it, (3,), m: box, plane and ellipsoid half sizes; sphere radius;
+            capsule and cylinder radius and half length (along z); mesh none.
+        color: red, green, blue, opacity, 0 to 255.
+        body: index into the stage's bodies, or `WORLD`.
+        position: (3,), m.
+        quaternion: (4,).
+        vertices: of a mesh, (v, 3), m; None for other kinds.
+        faces: triangles of a mesh, indices of vertices (f, 3); None for other kinds.
+    """
+
+    name: str
+    kind: str
+    size: Array
+    color: Rgba
+    body: int
+    position: Array
+    quaternion: Array
+    vertices: Array | None = None
+    faces: Array | None = None
+
+    def __post_init__(self) -> None:
+        what = f"geom {self.name!r}"
+        check_name("name of a geom", self.name)
+        if self.kind not in GEOM_KINDS:
+            raise InputError(f"{what}: kind", self.kind, f"one of {', '.join(GEOM_KINDS)}")
+        for name, length in (("size", 3), ("position", 3), ("quaternion", 4)):
+            check_shape(f"{what}: {name}", lock_array(self, name, what), (length,))
+        if len(self.color) != 4 or not all(0 <= part <= 255 for part in self.color):
+            raise InputError(f"{what}: color", self.color, "four integers, 0 to 255")
+        if self.kind == "mesh":
+            self._check_mesh(what)
+
+    def _check_mesh(self, what: str) -> None:
+        if self.vertices is None or self.faces is None:
+            raise InputError(f"{what}: vertices, faces", None, "arrays, as it is a mesh")
+        vertices, faces = lock_array(self, "vertices", what), lock_array(self, "faces", what)
+        check_shape(f"{what}: vertices", vertices, (len(vertices), 3))
+        check_shape(f"{what}: faces", faces, (len(faces), 3))
+        if faces.size and not (faces.min() >= 0 and faces.max() < len(vertices)):
+            raise InputError(f"{what}: faces", faces.max(), f"indices of {len(vertices)} vertices")
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A distance to a limit, which is at 0; positive is fine.
+
+    Attributes:
+        name: for the reader ("stretch 0"); unique on its stage.
+        kind: which constraint it watches.
+        unit: "N" or "m".
+        limit: what 0 means, in words ("at most 120 N"); may be empty.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    limit: str = ""
+
+    def __post_init__(self) -> None:
+        check_name("name of a margin", self.name)
+        check_name(f"kind of margin {self.name!r}", self.kind)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What is on stage.
+
+    Attributes:
+        name: of the hose model, or whatever tells two episodes apart; unique where two are shown.
+        title: for the reader.
+        geoms: the scene's shapes; names unique.
+        bodies: names of the bodies that move and have geoms, unique (B,).
+        robots: names, the tip's robot first (N,).
+        goal: shape of the goal, in no body.
+        arc_lengths: where the hose is sampled, rising (P,), m.
+        hose_radius: m.
+        tension_limit: what the hose may bear, N; the scale of its colours.
+        margins: what the constraint monitor measures (M,).
+        n_control_points: C, 0 if the hose has none.
+        low, high: corners of the space worth looking at, (3,) each, finite, m.
+        bounds: lowest and highest place for the robots, (2, 3), infinite where there is no bound.
+        settings: shown beside it, in this order.
+        source: where the hose begins, (3,), m.
+        cell: width of the squares drawn on the ground around the source, m; 0 for none.
+    """
+
+    name: str
+    title: str
+    geoms: tuple[Geom, ...]
+    bodies: tuple[str, ...]
+    robots: tuple[str, ...]
+    goal: Geom
+    arc_lengths: Array
+    hose_radius: float
+    tension_limit: float
+    margins: tuple[Margin, ...]
+    n_control_points: int
+    low: Array
+    high: Array
+    bounds: Array
+    source: Array
+    settings: dict[str, str] = field(default_factory=dict)
+    cell: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_name("name of a stage", self.name)
+        what = f"stage {self.name!r}"
+        check_unique(f"geoms of {what}", [geom.name for geom in self.geoms])
+        check_unique(f"bodies of {what}", list(self.bodies))
+        check_unique(f"margins of {what}", [margin.name for margin in self.margins])
+        for geom in self.geoms:
+            if not WORLD <= geom.body < len(self.bodies):
+                raise InputError(
+                    f"body of geom {geom.name!r}", geom.body, f"-1 to {len(self.bodies) - 1}"
+                )
+        check_rising(f"{what}: arc_lengths", lock_array(self, "arc_lengths", what), at_least=2)
+        for name in ("low", "high", "source"):
+            check_shape(f"{what}: {name}", lock_array(self, name, what), (3,))
+        if not np.all(self.low < self.high):
+            raise InputError(f"{what}: low", self.low.tolist(), f"below {self.high.tolist()}")
+        bounds = np.array(self.bounds, dtype=np.float64)
+        check_shape(f"{what}: bounds", bounds, (2, 3))
+        for name in ("hose_radius", "tension_limit"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"{what}: {name}", value, "a finite number above 0")
+        object.__setattr__(self, "bounds", bounds)
+        object.__setattr__(self, "settings", dict(self.settings))
+
+    @property
+    def size(self) -> float:
+        """Largest extent of the space worth looking at (m)."""
+        return float(np.max(self.high - self.low))
+
+    @property
+    def ground(self) -> float:
+        """Height of the highest plane, or of the lowest thing where there is none (m)."""
+        planes = [geom.position[2] for geom in self.geoms if geom.kind == "plane"]
+        return float(max(planes, default=self.low[2]))
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether it is much wider than high."""
+        extent = self.high - self.low
+        return bool(extent[2] < 0.4 * max(extent[:2]))

@@ -26,6 +26,9 @@ class Command:
 
 COMMANDS = {
     "bench": Command("tools.bench", "measure speed beside peers that people know"),
+    "check-breaks": Command(
+        "tools.check_breaks", "check that hose models break alike under the same moves"
+    ),
     "check-pcm": Command(
         "tools.check_pcm", "check that one task is a partially constrained model of another"
     ),

@@ -83,6 +83,11 @@ class Monitor:
         """Margins (M,) of the world as it stands, N or m: positive is fine, 0 the limit."""
         return self._measure().margins
 
+    @property
+    def margins(self) -> Array:
+        """Margins (M,) as the last `check` or `reset` measured them."""
+        return self._last.margins
+
     def check(self) -> Break | None:
         """Returns the earliest limit crossed since the last call; to be called after every step.
 

@@ -14,8 +14,8 @@ from hose_mj.world.servos import ArmServo, SlideServo, find_axes, is_constant
 from hose_mj.world.wheels import WheelServo
 from hose_mj.world.world import World
 
-BANDWIDTH = 30.0
-"""Of the servos that move a site directly (1/s): within 10 % of a step after 0.13 s."""
+BANDWIDTH = 60.0
+"""Of the servos that move a site directly (1/s): within 10 % of a step after 0.065 s."""
 BRAKING = 5.0
 """Braking (m/s^2) that stops a robot within half a cell: what the highest speed comes from."""
 

@@ -93,6 +93,9 @@ class GedsWorld(World):
             *(self.hose.obstacles, self.hose.gravity, n),
         ).control_points
         self._pucks = Pucks.find(self, self._touch) if compiled_pucks else None
+        # The coefficients of the centre line are linear in the control points.
+        unit = CentreLine.of_spline(*self.hose.weigh_spans())
+        self._line = unit.arc_lengths, unit.coefficients.reshape(-1, n)
         self.reset()
 
     # -- the world's protocol ----------------------------------------------------------------------
@@ -143,7 +146,9 @@ class GedsWorld(World):
 
     def centre_line(self) -> CentreLine:
         """See `World.centre_line`: the spline's own spans."""
-        return CentreLine.of_spline(*self.hose.find_spans())
+        arc_lengths, weights = self._line
+        coefficients = weights @ self.hose.control_points
+        return CentreLine(arc_lengths, coefficients.reshape(-1, 4, 3))
 
     def attachment_forces(self) -> Array:
         """See `World.attachment_forces`: means over the last step; at the source its end's."""

@@ -114,15 +114,15 @@ class SplineBody:
         stiffness = mechanics.find_torsional_stiffness(self._hose, s)
         return np.asarray(stiffness * self.twist(s))
 
-    def find_spans(self) -> tuple[Array, Array, Array]:
-        """The spline's spans: where they meet.
+    def weigh_spans(self) -> tuple[Array, Array, Array]:
+        """What the control points count for where the spline's spans meet; constant.
 
         Returns:
-            arc lengths (S + 1,), m; points there (S + 1, 3), m; dr/ds there (S + 1, 3).
+            arc lengths (S + 1,), m; weights (S + 1, n) of the points there, and of dr/ds, 1/m.
         """
         at = np.linspace(0.0, self.spec.length, self._spline.n_control_points - basis.DEGREE + 1)
-        points, slopes = (self._spline.evaluate(at, self._state.x, k) for k in (0, 1))
-        return at, points + self._spline.offset, slopes
+        values, slopes = (self._spline.compute_jacobian(at, k).T for k in (0, 1))
+        return at, values, slopes
 
     def energies(self) -> Energies:
         """Energies at the present state (thesis A.10, A.15)."""

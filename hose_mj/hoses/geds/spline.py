@@ -135,13 +135,13 @@ class Spline:
         """Returns flat unknowns of the spline through n points (n, 3), theta zero (thesis A.3)."""
         return self.from_world(basis.interpolate(self.knots, arc_lengths, points))
 
-    def compute_jacobian(self, arc_lengths: Array) -> Array:
-        """Returns J_pr of thesis A.24 at arc lengths (l,): N_i(s_j), shape (n, l)."""
+    def compute_jacobian(self, arc_lengths: Array, derivative: int = 0) -> Array:
+        """Returns J_pr of thesis A.24 at arc lengths (l,): N_i(s_j), or a derivative, (n, l)."""
         spans, values = basis.compute_basis(self.knots, arc_lengths)
         jacobian = np.zeros((self.n_control_points, len(arc_lengths)))
         columns = np.arange(len(arc_lengths))
         for i in range(4):
-            jacobian[spans + i, columns] = values[:, 0, i]
+            jacobian[spans + i, columns] = values[:, derivative, i]
         return jacobian
 
     # -- checks --------------------------------------------------------------------------------

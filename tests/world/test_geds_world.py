@@ -120,7 +120,7 @@ def test_what_the_hose_does_to_a_body_moves_it(write_scene):
 
 @pytest.mark.parametrize("compiled_pucks", [True, False])
 def test_a_robot_shoves_the_hose_of_its_neighbour_and_feels_it(write_scene, compiled_pucks):
-    # Robot 1 is driven into the stretch on the other side of robot 0; momentum balances.
+    # Robot 1 is driven into the stretch behind it; momentum balances.
     robots = [
         write_scene.slider(0, (0.55, 0.1, 0.0), 1.0, axes="xy"),
         write_scene.slider(1, (0.3, 0.0, 0.0), 1.0, axes="xy", size=0.03),
@@ -128,7 +128,7 @@ def test_a_robot_shoves_the_hose_of_its_neighbour_and_feels_it(write_scene, comp
     top = '<custom><numeric name="hose_attachments" data="0.9 0.5"/></custom>'
     scene = write_scene(robots, top=top)
     world = GedsWorld(scene, scheme="backward-euler", compiled_pucks=compiled_pucks)
-    middle = world.position([0.7])[0]
+    middle = world.position([0.2])[0]
     aim = middle - world.site_positions()[1]
     world.apply_force(1, 6.0 * aim / np.linalg.norm(aim))
     start = momentum_of(world)
@@ -167,7 +167,7 @@ def test_a_mesh_is_felt_like_the_box_that_it_is(write_scene):
     np.testing.assert_allclose(lines[1], lines[0], atol=2e-3)
 
 
-@pytest.mark.parametrize("name", ["floor_3", "deck"])
+@pytest.mark.parametrize("name", ["floor_3", "deck", "lift"])
 def test_a_restored_world_goes_on_bit_by_bit(name):
     world = make_world(name)
     world.control[:] = 0.3 * world.model.actuator_ctrlrange[:, 1]
@@ -188,6 +188,24 @@ def test_a_restored_world_goes_on_bit_by_bit(name):
     fresh.restore(state)
     fresh.step(40)
     np.testing.assert_array_equal(fresh.position([0.5]), world.position([0.5]))
+
+
+def test_the_hose_rubs_on_what_turns_under_it(write_scene):
+    # A drum turns below the hose and carries it along.
+    drum = (
+        '<body name="drum" pos="0.4 0 -0.11"><joint type="hinge" axis="0 1 0"/>'
+        '<geom type="cylinder" size="0.1 0.3" zaxis="0 1 0" mass="50"/></body>'
+    )
+    robots = [write_scene.slider(0, (0.9, 0.0, 0.0), 0.01, axes="x", solid=False)]
+    pulls = []
+    for spin in (20.0, -20.0):
+        world = GedsWorld(write_scene(robots, drum, gravity="0 0 -9.81"))
+        world.data.qvel[0] = spin
+        world.restore(world.snapshot())
+        world.step(20)
+        pulls.append(float(world.hose.push_on_obstacles()[0, 0]))
+    assert pulls[0] < -0.02
+    assert pulls[1] > 0.02
 
 
 def test_the_centre_line_is_the_hose():

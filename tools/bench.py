@@ -17,19 +17,24 @@ from tools.document import make_document, print_document
 if TYPE_CHECKING:
     from tools.bench_records import Bench
 
-GROUPS = {"env": "tools.bench_env", "hose": "tools.bench_hose", "learn": "tools.bench_learn"}
+GROUPS = {
+    "env": "tools.bench_env",
+    "hose": "tools.bench_hose",
+    "learn": "tools.bench_learn",
+    "world": "tools.bench_world",
+}
 """The groups, each a module with a function `measure(quick, seed) -> Bench`."""
 
 
 @dataclass(frozen=True)
 class Args:
-    """Measure speed: compiled tasks and environments (env), hose models (hose), learners (learn).
+    """Measure speed: tasks and environments (env), hoses (hose), learners (learn), worlds (world).
 
     Every number is the best of several rounds on this machine, after compilation, in seconds of the
     processor where one core works and of the wall clock where several do.
     """
 
-    group: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="{env,hose,learn}")]
+    group: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="{env,hose,learn,world}")]
     """What to measure."""
     quick: bool = False
     """Fewer and shorter rounds."""

@@ -157,15 +157,14 @@ class GedsWorld(World):
 
     def hose_snapshot(self) -> dict[str, Any]:
         """See `World.hose_snapshot`."""
-        return {"hose": self.hose.snapshot(), "pushes": self._touch.pushes.copy()}
+        return {"hose": self.hose.snapshot(), "touch": self._touch.snapshot()}
 
     def restore_hose(self, state: dict[str, Any]) -> None:
         """See `World.restore_hose`."""
         self.hose.restore(state["hose"])
         self._holds = self.hose.holds
         self._update_poses()
-        self._touch.pushes[:] = state["pushes"]
-        self._touch.place()
+        self._touch.restore(state["touch"])
 
     # -- inside ------------------------------------------------------------------------------------
 

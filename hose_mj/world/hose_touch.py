@@ -67,13 +67,28 @@ class HoseTouch:
         self.pushes[:], self._measured_forces[:] = 0.0, 0.0
         self.place()
 
+    def snapshot(self) -> dict[str, Array]:
+        """What the next step depends on beyond the hose and MuJoCo's state."""
+        return {
+            "pushes": self.pushes.copy(),
+            "measured_forces": self._measured_forces.copy(),
+            "nearest": self._measured.geoms.copy(),
+        }
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Returns to a snapshot; MuJoCo's poses are back already."""
+        self.pushes[:] = state["pushes"]
+        self._measured_forces[:] = state["measured_forces"]
+        self._measured = self._measured._replace(geoms=state["nearest"].copy())
+        self.place()
+
     def place(self) -> None:
         """Moves the obstacles to where their geoms are."""
         if not len(self._moving):
             return
         data, k = self._data, len(self._moving)
         mujoco.mj_comVel(self._model, data)
-        twists = np.array([self._find_twist(g) for g in self._moving])
+        twists = self._find_twists(self._moving)
         rotations = data.geom_xmat[self._moving].reshape(k, 3, 3)
         moving = self.geoms.moving
         self._hose.place_obstacles(moving, data.geom_xpos[self._moving], rotations, twists)
@@ -86,16 +101,20 @@ class HoseTouch:
         points = hose.position(hose.contact_arc_lengths)
         found = self._measured = self._meter.measure(self._data, points)
         speeds = np.zeros_like(points)
-        for g in np.unique(found.geoms[found.geoms >= 0]):
-            mine, twist = found.geoms == g, self._find_twist(g)
+        near = np.unique(found.geoms[found.geoms >= 0])
+        for g, twist in zip(near, self._find_twists(near), strict=True):
+            mine = found.geoms == g
             speeds[mine] = twist[:3] + np.cross(twist[3:], points[mine] - self._data.geom_xpos[g])
         hose.set_distances(found.distances, found.normals, self._friction, speeds)
 
-    def _find_twist(self, geom: int) -> Array:
-        """Velocity and angular velocity of a geom, world frame, (6,); `mj_comVel` goes before."""
-        found, kind = np.zeros(6), mujoco.mjtObj.mjOBJ_GEOM
-        mujoco.mj_objectVelocity(self._model, self._data, kind, int(geom), found, 0)
-        return np.concatenate([found[3:], found[:3]])
+    def _find_twists(self, geoms: np.ndarray) -> Array:
+        """Velocities and angular velocities of geoms (k,), (k, 6); `mj_comVel` goes before."""
+        model, data = self._model, self._data
+        bodies = model.geom_bodyid[geoms]
+        spins = data.cvel[bodies, :3]
+        # MuJoCo's velocities are those of the material at the tree's centre of mass.
+        arms = data.geom_xpos[geoms] - data.subtree_com[model.body_rootid[bodies]]
+        return np.concatenate([data.cvel[bodies, 3:] + np.cross(spins, arms), spins], axis=1)
 
     def update(self) -> None:
         """After a step: what the hose did to geoms, where it felt them, is known; they move on."""
@@ -108,12 +127,12 @@ class HoseTouch:
 
     def push(self, generalized: Array) -> None:
         """Adds what the hose did to moving geoms in the last step to generalised forces (nv,)."""
-        for row, g in zip(self.pushes, self._moving, strict=True):
-            if row.any():
-                mujoco.mj_applyFT(
-                    *(self._model, self._data, row[:3], row[3:], self._data.geom_xpos[g]),
-                    *(self._model.geom_bodyid[g], generalized),
-                )
+        for k in np.flatnonzero(self.pushes.any(axis=1)):
+            row, g = self.pushes[k], self._moving[k]
+            mujoco.mj_applyFT(
+                *(self._model, self._data, row[:3], row[3:], self._data.geom_xpos[g]),
+                *(self._model.geom_bodyid[g], generalized),
+            )
         points = None
         for q in np.flatnonzero(self._measured_forces.any(axis=1)):
             body = self._model.geom_bodyid[self._measured.geoms[q]]

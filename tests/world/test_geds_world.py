@@ -118,36 +118,38 @@ def test_what_the_hose_does_to_a_body_moves_it(write_scene):
     assert sunk == pytest.approx((9.81 - push[2]) / 400.0, rel=1e-4)
 
 
-@pytest.mark.parametrize("compiled_pucks", [True, False])
-def test_a_robot_shoves_the_hose_of_its_neighbour_and_feels_it(write_scene, compiled_pucks):
-    # Robot 1 is driven into the stretch on the other side of robot 0; momentum balances.
-    robots = [
-        write_scene.slider(0, (0.55, 0.1, 0.0), 1.0, axes="xy"),
-        write_scene.slider(1, (0.3, 0.0, 0.0), 1.0, axes="xy", size=0.03),
-    ]
-    top = '<custom><numeric name="hose_attachments" data="0.9 0.5"/></custom>'
-    scene = write_scene(robots, top=top)
-    world = GedsWorld(scene, scheme="backward-euler", compiled_pucks=compiled_pucks)
-    middle = world.position([0.7])[0]
-    aim = middle - world.site_positions()[1]
-    world.apply_force(1, 6.0 * aim / np.linalg.norm(aim))
-    start = momentum_of(world)
-    impulse, touched = np.zeros(3), 0.0
-    for _ in range(80):
-        before = world._touch.pushes[:, :3].sum(axis=0)
+def test_a_ball_thrown_at_the_hose_gives_it_what_it_loses(write_scene):
+    ball = (
+        '<body name="ball" pos="0.5 0.1 0"><joint type="slide" axis="1 0 0"/>'
+        '<joint type="slide" axis="0 1 0"/><geom type="sphere" size="0.03" mass="0.3"/></body>'
+    )
+    robots = [write_scene.slider(0, (0.96, 0.0, 0.0), 5.0, axes="xy")]
+    world = GedsWorld(write_scene(robots, ball), scheme="backward-euler")
+    thrown = world.model.joint(1).dofadr[0]  # after the first slide, that along y
+    assert world.model.body("ball").dofadr[0] == 0
+    world.data.qvel[thrown] = -1.0
+    world.restore(world.snapshot())
+
+    def add_up():
+        others = 0.3 * world.data.qvel[:2] + 5.0 * world.data.qvel[2:4]
+        return world.hose.momentum().linear[:2] + others
+
+    errors, pushed = [], 0.0
+    for _ in range(100):
+        start, fallbacks = add_up(), world.hose.fallbacks
+        before = world._touch.pushes[:, :2].sum(axis=0)
         world.step()
-        after = world._touch.pushes[:, :3].sum(axis=0)
-        touched = max(touched, np.abs(after).max())
-        # Contact reaches the robots one step late.
-        forces = world.robot_forces.sum(axis=0) + world.attachment_forces()[-1] + before - after
-        impulse += world.timestep * forces
-    assert touched > 0.05
-    np.testing.assert_allclose((momentum_of(world) - start)[:2], impulse[:2], atol=5e-3)
-
-
-def momentum_of(world):
-    robots = world.site_velocities()[:-1].sum(axis=0)
-    return world.hose.momentum().linear + robots
+        after = world._touch.pushes[:, :2].sum(axis=0)
+        pushed = max(pushed, float(np.abs(after).max()))
+        # Contact reaches the ball one step late. What the source does in a step that was taken in
+        # parts is not known.
+        if world.hose.fallbacks == fallbacks:
+            impulse = world.timestep * (world.attachment_forces()[-1, :2] + before - after)
+            errors.append(np.abs(add_up() - start - impulse).max())
+    assert pushed > 0.5
+    assert world.data.qvel[thrown] > -0.9
+    assert len(errors) > 90
+    assert max(errors) < 1e-3
 
 
 def test_a_mesh_is_felt_like_the_box_that_it_is(write_scene):
@@ -167,7 +169,7 @@ def test_a_mesh_is_felt_like_the_box_that_it_is(write_scene):
     np.testing.assert_allclose(lines[1], lines[0], atol=2e-3)
 
 
-@pytest.mark.parametrize("name", ["floor_3", "deck"])
+@pytest.mark.parametrize("name", ["floor_3", "deck", "lift"])
 def test_a_restored_world_goes_on_bit_by_bit(name):
     world = make_world(name)
     world.control[:] = 0.3 * world.model.actuator_ctrlrange[:, 1]
@@ -188,6 +190,24 @@ def test_a_restored_world_goes_on_bit_by_bit(name):
     fresh.restore(state)
     fresh.step(40)
     np.testing.assert_array_equal(fresh.position([0.5]), world.position([0.5]))
+
+
+def test_the_hose_rubs_on_what_turns_under_it(write_scene):
+    # A drum turns below the hose and carries it along.
+    drum = (
+        '<body name="drum" pos="0.4 0 -0.11"><joint type="hinge" axis="0 1 0"/>'
+        '<geom type="cylinder" size="0.1 0.3" zaxis="0 1 0" mass="50"/></body>'
+    )
+    robots = [write_scene.slider(0, (0.9, 0.0, 0.0), 0.01, axes="x", solid=False)]
+    pulls = []
+    for spin in (20.0, -20.0):
+        world = GedsWorld(write_scene(robots, drum, gravity="0 0 -9.81"))
+        world.data.qvel[0] = spin
+        world.restore(world.snapshot())
+        world.step(20)
+        pulls.append(float(world.hose.push_on_obstacles()[0, 0]))
+    assert pulls[0] < -0.02
+    assert pulls[1] > 0.02
 
 
 def test_the_centre_line_is_the_hose():

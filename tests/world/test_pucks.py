@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hose_mj.world.driving import Driver
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.registry import make_world
 
@@ -28,6 +29,24 @@ def test_pucks_move_as_mujoco_moves_them(scheme):
     np.testing.assert_allclose(fast.position(s), slow.position(s), rtol=0, atol=1e-8)
     np.testing.assert_allclose(fast.tension(s), slow.tension(s), atol=1e-4)
     assert fast.time == slow.time == pytest.approx(fast.data.time)
+
+
+def test_a_puck_that_runs_over_the_hose_feels_it_as_mujoco_lets_it():
+    worlds = [make_world("floor_2", compiled_pucks=fast) for fast in (True, False)]
+    pushed = []
+    for world in worlds:
+        driver = Driver(world)
+        target = world.site_positions()[:-1]
+        target[0] = world.position([0.2])[0]
+        driver.drive_to(target)
+        for _ in range(230):
+            driver.update()
+            world.step()
+        pushed.append(world._touch.pushes[:, :3].sum(axis=0))
+    assert np.abs(pushed[0][:2]).max() > 0.01
+    np.testing.assert_allclose(pushed[0], pushed[1], atol=1e-5)
+    np.testing.assert_allclose(worlds[0].data.qpos, worlds[1].data.qpos, atol=1e-8)
+    assert worlds[0].sweeps < 230
 
 
 def test_pucks_that_may_meet_are_mujocos(write_scene):

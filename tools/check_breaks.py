@@ -81,10 +81,9 @@ def run(args: Args) -> int:
         for pair in pairs
     ]
     if args.json:
-        results = {"kinds": {model: _count(found) for model, found in endings.items()}}
-        document = make_document(
-            "check-breaks", args, checks=checks, results={**results, "pairs": pairs}
-        )
+        kinds = {model: _count(found) for model, found in endings.items()}
+        results = {"kinds": kinds, "pairs": pairs}
+        document = make_document("check-breaks", args, checks=checks, results=results)
         print_document(document)
     else:
         for model, found in endings.items():

@@ -88,7 +88,7 @@ def test_a_small_step_is_a_damped_oscillation():
     world = make_bare("floor_1")
     world.model.opt.timestep = 1e-4
     driver = Driver(world)
-    start, step = driver.targets[0, 0], 0.02
+    start, step = driver.targets[0, 0], 0.01
     driver.targets[0, 0] += step
     fall = 2.0 * WIDTH + 5.0 / 0.5
     root = math.sqrt(fall**2 - 4.0 * WIDTH**2)

@@ -14,10 +14,9 @@ from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError, StepError
 from hose_mj.recording.files import write_atomically
-from hose_mj.scenes.mjcf import Scene
 from hose_mj.world.actions import Actions
 from hose_mj.world.driving import Driver
-from hose_mj.world.registry import make_world
+from hose_mj.world.world import World
 
 MOVES = ("up", "down", "left", "right")
 KEEP = 0.7
@@ -103,8 +102,7 @@ def play_sequence(monitor: Monitor, moves: Sequence[Move]) -> Ending:
 
 
 def play_all(
-    scene: Scene,
-    model: str,
+    make_world: Callable[[], World],
     sequences: Sequence[Sequence[Move]],
     limits: Limits,
     kept: Kept,
@@ -113,8 +111,7 @@ def play_all(
     """Plays all sequences that are not kept yet, and keeps each.
 
     Args:
-        scene: where.
-        model: of the hose.
+        make_world: makes the world, if it is needed.
         sequences: of moves.
         limits: that break.
         kept: the endings so far, and where to.
@@ -124,7 +121,7 @@ def play_all(
     advance(len(endings))
     if len(endings) == len(sequences):
         return endings
-    monitor = Monitor(make_world(scene, model), limits)
+    monitor = Monitor(make_world(), limits)
     for moves in sequences[len(endings) :]:
         endings.append(play_sequence(monitor, moves))
         kept.write(endings)

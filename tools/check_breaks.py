@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 AGREE = 0.9
 QUICK = 20
 QUICK_MODELS = ("geds", "flex")
+FINER = 2
+"""Control points of geds per one that its world takes by itself, to be as fine as 40 segments."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Args:
     """Moves in a sequence at most."""
     quick: bool = False
     """Play 20 sequences, with geds and flex."""
+    control_points: int | None = None
+    """Control points of geds; by default twice as many as its world takes by itself, see docs."""
     max_tension: float | None = None
     """Tension that breaks a segment (N); by default the rule of the constraints."""
     out: Path | None = None
@@ -58,6 +63,8 @@ def run(args: Args) -> int:
     _check(args)
     from hose_mj.constraints.limits import Limits
     from hose_mj.scenes.mjcf import find_scene, read_scene
+    from hose_mj.world.laying import count_control_points
+    from hose_mj.world.registry import make_world
     from tools.break_sequences import Kept, draw_sequences, play_all
 
     models = QUICK_MODELS if args.quick else args.models
@@ -65,13 +72,18 @@ def run(args: Args) -> int:
     limits = Limits(max_tension=args.max_tension)
     scene = read_scene(find_scene(args.scene))
     sequences = draw_sequences(args.seed, number, args.moves, len(scene.robots))
+    points = args.control_points
+    if points is None:
+        points = FINER * count_control_points(len(scene.robots))
     endings = {}
     with show_progress("sequences", number * len(models)) as advance:
         for model in models:
             settings = {"scene": args.scene, "model": model, "seed": args.seed}
             settings |= {"moves": args.moves, "max_tension": args.max_tension}
-            kept = Kept(args.out and args.out / f"{model}.json", settings)
-            endings[model] = play_all(scene, model, sequences, limits, kept, advance)
+            options = {"control_points": points} if model == "geds" else {}
+            kept = Kept(args.out and args.out / f"{model}.json", settings | options)
+            make = partial(make_world, scene, model, **options)
+            endings[model] = play_all(make, sequences, limits, kept, advance)
     pairs = [
         compare_models((a, b), (endings[a], endings[b]), sequences)
         for a, b in combinations(models, 2)

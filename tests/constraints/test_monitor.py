@@ -153,7 +153,9 @@ def test_measuring_in_between_changes_nothing(floor):
     floor.put(0, (0.53, 0.3))
     floor.step()
     assert monitor.measure()[5] < 0.0
+    assert monitor.margins[5] > 0.0
     assert monitor.check().kind == "bounds"
+    assert np.array_equal(monitor.margins, monitor.measure())
 
 
 def test_a_break_says_and_records_itself(floor):

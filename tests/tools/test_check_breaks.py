@@ -28,7 +28,8 @@ def models(monkeypatch):
 
 
 def ask(capsys, *words):
-    status = cli.main(["check-breaks", "--json", *words])
+    """With the world's own control points, so that geds is its twin."""
+    status = cli.main(["check-breaks", "--json", "--control-points", "16", *words])
     return status, json.loads(capsys.readouterr().out)
 
 
@@ -119,7 +120,7 @@ def test_a_run_goes_on_from_what_is_kept(capsys, models, tmp_path):
     (record,) = document["pairs"][0]["disagreements"]
     assert (record["number"], record["geds"]["text"]) == (0, "kept")
     assert len(json.loads((tmp_path / "twin.json").read_text())["endings"]) == 2
-    assert cli.main(["check-breaks", *words, "--seed", "3"]) == 2
+    assert cli.main(["check-breaks", *words, "--control-points", "17"]) == 2
     assert "geds.json" in capsys.readouterr().err
 
 

@@ -23,7 +23,10 @@ class CentreLine:
 
     @classmethod
     def of_spline(cls, arc_lengths: Array, points: Array, slopes: Array) -> CentreLine:
-        """The curve that is cubic in each piece, with points (K + 1, 3), m, and dr/ds there."""
+        """The curve that is cubic in each piece, with points (K + 1, 3), m, and dr/ds there.
+
+        Linear in both, so columns may also be what each of n control points counts for.
+        """
         lengths = np.diff(arc_lengths)[:, None]
         first, last = lengths * slopes[:-1], lengths * slopes[1:]
         step = points[1:] - points[:-1]

@@ -15,6 +15,7 @@ from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
+_DETOURS = tuple(math.radians(a) for a in (30, -30, 60, -60))
 _BEYOND = 1.5
 """How much farther than a segment is long its ends are driven apart."""
 _BEHIND = 0.5
@@ -98,7 +99,10 @@ def list_exits(driver: Driver) -> list[Script]:
 
 
 def list_obstacles(driver: Driver) -> list[Script]:
-    """A robot driven at an obstacle, the nearest first."""
+    """A robot driven at an obstacle, the nearest first; straight, or from a side.
+
+    From a side, since straight ahead the hose may lie between the two and be squeezed.
+    """
     world = driver.world
     found: list[tuple[float, Script]] = []
     for robot in range(world.n_robots):
@@ -110,6 +114,7 @@ def list_obstacles(driver: Driver) -> list[Script]:
             if length > 0.0:
                 step = towards * (1.0 + _BEHIND * world.scene.cell_size / length)
                 found += _list_ways(driver, robot, step)
+                found += _list_detours(driver, robot, step)
     return [script for _, script in sorted(found, key=lambda item: item[0])]
 
 
@@ -134,6 +139,20 @@ def _list_ways(driver: Driver, robot: int, step: Array) -> list[tuple[float, Scr
     for cost, slack, pace in ((1.2, 0.9, 1.0), (2.0, 0.75, 1.0), (2.5, 0.9, 0.5)):
         together = relax(alone.formations[0], robot, sites[-1], slack * spans)
         ways.append((cost * distance, Script(robot, together[None], pace)))
+    return ways
+
+
+def _list_detours(driver: Driver, robot: int, step: Array) -> list[tuple[float, Script]]:
+    """A robot moves by a step, but ends it from a side; and how far, the turns counted double."""
+    world = driver.world
+    sites = world.site_positions()
+    end = sites[robot] + step
+    ways = []
+    for angle in _DETOURS:
+        beside = end - _turn(step, angle)
+        script = move(world, robot, {robot: beside}, {robot: end})
+        first, length = (float(np.linalg.norm(v)) for v in (beside - sites[robot], step))
+        ways.append((2.0 * first + length, script))
     return ways
 
 

@@ -24,6 +24,8 @@ SLOW_MODELS = ("cable", "flex")
 MOST_TRIALS = 24
 LONGEST, LONGEST_OF_ALL = 5.0, 20.0
 """Simulated time of a trial, and of all, at most (s)."""
+SLOWNESS = 4.0
+"""How often time simulated with one of MuJoCo's hoses counts: it takes several times as long."""
 PATIENCE = 1.5
 """How much longer than its targets take a trial goes on, and a second more."""
 
@@ -72,7 +74,8 @@ class Rehearsal:
                 break
             for stage in self._stages:
                 trial = self._play(script, *stage)
-                spent += trial.time
+                slow = stage[0].hose_model in SLOW_MODELS
+                spent += trial.time * (SLOWNESS if slow else 1.0)
                 if not is_wanted(trial):
                     break
             trials.append(trial)

@@ -1,9 +1,9 @@
 """Which of several scripts does what is wanted, found by playing each and going back.
 
 A robot in a corridor cannot be told to stretch a hose by geometry alone: the hose hangs, catches
-and whips. So the scripts are tried in order, on the world itself where its hose is a spline. Where it
-is one of MuJoCo's, which takes far longer, they are tried on a spline hose in the same scene, and
-what does there as wanted is then tried on the world itself: not all carries over.
+and whips. So the scripts are tried in order, on the world itself where its hose is a spline. Where
+it is one of MuJoCo's, which takes far longer, they are tried on a spline hose in the same scene,
+and what does there as wanted is then tried on the world itself: not all carries over.
 """
 
 from __future__ import annotations

@@ -15,10 +15,13 @@ from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
+_DETOURS = tuple(math.radians(a) for a in (30, -30, 60, -60))
 _BEYOND = 1.5
 """How much farther than a segment is long its ends are driven apart."""
 _BEHIND = 0.5
 """How far behind an obstacle or a bound a robot is driven, in cells."""
+_SLACK = 0.95
+"""Share of a segment that neighbours may be apart where some follow another."""
 _SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)
 """Where along a segment it is run over, the middle first."""
 
@@ -43,7 +46,10 @@ def list_stretches(driver: Driver) -> list[Script]:
 
 
 def list_run_overs(driver: Driver) -> list[Script]:
-    """A robot driven across each segment, at several places, those it does not hold first."""
+    """A robot driven across each segment, at several places, those it does not hold first.
+
+    Each way is taken alone, then with the others following so that segments stay slack.
+    """
     world = driver.world
     sites, arcs = world.site_positions(), world.arc_lengths
     found: list[tuple[int, float, Script]] = []
@@ -59,7 +65,8 @@ def list_run_overs(driver: Driver) -> list[Script]:
                 across = point + 2.0 * radius * _point(sites[robot], point)
                 distance = float(np.linalg.norm(point - sites[robot]))
                 found.append((own, distance, move(world, robot, {robot: across})))
-    return [script for _, _, script in sorted(found, key=lambda item: item[:2])]
+    alone = [script for _, _, script in sorted(found, key=lambda item: item[:2])]
+    return [way for script in alone for way in (script, _follow(driver, script))]
 
 
 def list_collisions(driver: Driver) -> list[Script]:
@@ -98,7 +105,10 @@ def list_exits(driver: Driver) -> list[Script]:
 
 
 def list_obstacles(driver: Driver) -> list[Script]:
-    """A robot driven at an obstacle, the nearest first."""
+    """A robot driven at an obstacle, the nearest first; straight, or from a side.
+
+    From a side, since straight ahead the hose may lie between the two and be squeezed.
+    """
     world = driver.world
     found: list[tuple[float, Script]] = []
     for robot in range(world.n_robots):
@@ -110,6 +120,7 @@ def list_obstacles(driver: Driver) -> list[Script]:
             if length > 0.0:
                 step = towards * (1.0 + _BEHIND * world.scene.cell_size / length)
                 found += _list_ways(driver, robot, step)
+                found += _list_detours(driver, robot, step)
     return [script for _, script in sorted(found, key=lambda item: item[0])]
 
 
@@ -134,6 +145,27 @@ def _list_ways(driver: Driver, robot: int, step: Array) -> list[tuple[float, Scr
     for cost, slack, pace in ((1.2, 0.9, 1.0), (2.0, 0.75, 1.0), (2.5, 0.9, 0.5)):
         together = relax(alone.formations[0], robot, sites[-1], slack * spans)
         ways.append((cost * distance, Script(robot, together[None], pace)))
+    return ways
+
+
+def _follow(driver: Driver, script: Script) -> Script:
+    """The same with the other robots drawn after the one it is about."""
+    source, spans = driver.world.site_positions()[-1], -_SLACK * np.diff(driver.world.arc_lengths)
+    drawn = [relax(places, script.robot, source, spans) for places in script.formations]
+    return Script(script.robot, np.array(drawn), script.pace)
+
+
+def _list_detours(driver: Driver, robot: int, step: Array) -> list[tuple[float, Script]]:
+    """A robot moves by a step, but ends it from a side; and how far, the turns counted double."""
+    world = driver.world
+    sites = world.site_positions()
+    end = sites[robot] + step
+    ways = []
+    for angle in _DETOURS:
+        beside = end - _turn(step, angle)
+        script = move(world, robot, {robot: beside}, {robot: end})
+        first, length = (float(np.linalg.norm(v)) for v in (beside - sites[robot], step))
+        ways.append((2.0 * first + length, script))
     return ways
 
 

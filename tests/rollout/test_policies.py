@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -28,8 +30,8 @@ CASES = [
 ]
 
 
-def run(name, policy, duration=5.0, seed=0):
-    world = make_world(name)
+def run(name, policy, duration=5.0, seed=0, model="geds"):
+    world = make_world(name, model)
     monitor = Monitor(world)
     generator = np.random.default_rng(seed)
     policy = make_policy(policy)
@@ -47,6 +49,24 @@ def test_the_break_comes_first(name, kind):
     assert outcome.ended_by == "break"
     assert outcome.broken.kind == kind
     assert outcome.sim_time > 0.05  # not from the start
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["run-over", "collision"])
+def test_what_a_spline_rehearses_is_confirmed_on_the_hose_itself(kind):
+    # On the deck the first scripts that do so with a spline stretch this hose before.
+    _, outcome = run("deck", f"break-{kind}", model="flex")
+    assert outcome.broken.kind == kind
+
+
+def test_the_scene_to_copy_runs_into_its_post(tmp_path):
+    # Straight ahead, the hose lies between robot and post; from a side it does not.
+    text = (Path(__file__).parents[2] / "docs/scenes.md").read_text()
+    path = tmp_path / "my_scene.xml"
+    path.write_text(text.split("```xml\n")[1].split("```")[0])
+    _, outcome = run(path, "break-obstacle")
+    assert (outcome.broken.kind, outcome.broken.other) == ("obstacle", "post")
+    assert run(path, "to-goal")[1].ended_by == "goal"
 
 
 @pytest.mark.parametrize("kind", KINDS[:3])

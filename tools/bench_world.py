@@ -1,4 +1,4 @@
-"""The group `world`: robots on a hose, each hose model with the time step of the scene.
+"""The group `world`: robots on a hose, each hose model with the time step of the scene; recording.
 
 The cable divides it into as many parts as keep robots and hose together (docs/mujoco_cable.md);
 without parts they part by millimetres when driven hard. `geds` also runs at 5 ms.
@@ -6,12 +6,20 @@ without parts they part by millimetres when driven hard. `geds` also runs at 5 m
 
 from __future__ import annotations
 
+import tempfile
+import time
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.constraints.monitor import Monitor
+from hose_mj.recording.rerun import open_sinks
+from hose_mj.rollout.capture import Capture
+from hose_mj.rollout.episode import run_episode
+from hose_mj.scenes.mjcf import Scene, find_scene, read_scene
 from hose_mj.world.driving import Driver
 from hose_mj.world.registry import make_world
 from hose_mj.world.world import World
@@ -20,8 +28,15 @@ from tools.bench_records import Bench, Record, measure_rate
 PEER = "cable, 40 segments"
 LEAST_RATIO = 20.0
 """Limit: how many times as many simulated seconds a second as the cable."""
+MOST_RECORDING = 0.05
+"""Limit: processor time of recording over that of the rollout."""
+_SHORT, _LONG = 5.0, 25.0
+"""Simulated seconds of two rollouts: what both cost alike, opening and closing a file, is no part
+of the cost of recording."""
 _TOW = 0.2
-"""Speed at which the robots tow the hose (m/s)."""
+"""Speed at which the robots tow the hose (m/s), round a circle."""
+_RADIUS = 0.04
+"""Of the circle (m)."""
 
 
 def measure(quick: bool, seed: int) -> Bench:
@@ -59,20 +74,74 @@ def measure(quick: bool, seed: int) -> Bench:
     for name in ("geds", "geds, 5 ms"):
         check = f"{name}: simulated seconds a second, times {PEER}"
         bench.checks.append(Check(check, rates[name] / rates[PEER], LEAST_RATIO, ">="))
+    recording = _measure_recording(scene, phase, 1 if quick else 3)
+    bench.records.append(Record("world", "recording over the rollout, geds", recording, "1"))
+    name = "recording to a file: processor time over that of the rollout"
+    bench.checks.append(Check(name, recording, MOST_RECORDING, "<="))
     return bench
+
+
+class _Tow:
+    """The policy of `_tow`."""
+
+    ends_at_goal = False
+
+    def __init__(self, phase: float) -> None:
+        self._phase = phase
+
+    def start(self, world: World, monitor: Monitor, generator: np.random.Generator) -> None:
+        """Begins the path where the robots are."""
+        self._world, self._driver = world, Driver(world)
+        self._start = world.site_positions()[:-1]
+
+    def update(self) -> None:
+        """Drives on."""
+        self._driver.drive_to(self._start + _find_turn(self._phase, self._world.time))
+        self._driver.update()
+
+    def describe(self) -> dict[str, Any]:
+        """Nothing to say."""
+        return {}
+
+
+def _measure_recording(scene: Scene, phase: float, rounds: int) -> float:
+    """Processor time of recording a second of a rollout over that of the second itself."""
+    world = make_world(scene)
+    monitor = Monitor(world)
+
+    def play(duration: float, save: Path | None) -> float:
+        world.reset()
+        begun = time.process_time()
+        with Capture(open_sinks(save=save)) as capture:
+            observers = [capture] if save else []
+            run_episode(world, monitor, _Tow(phase), duration=duration, observers=observers)
+        return time.process_time() - begun
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "rollout.rrd"
+        least = dict.fromkeys(((d, s) for d in (_SHORT, _LONG) for s in (None, file)), np.inf)
+        for _ in range(rounds + 1):  # the first also compiles
+            for duration, save in least:
+                spent = play(duration, save)
+                least[duration, save] = min(least[duration, save], spent)
+    plain, recorded = (least[_LONG, save] - least[_SHORT, save] for save in (None, file))
+    return recorded / plain - 1.0
+
+
+def _find_turn(phase: float, now: float) -> np.ndarray:
+    """Where robots that go round a circle are, seen from where they began (3,), m."""
+    angle = phase + _TOW / _RADIUS * now
+    return _RADIUS * np.array([np.cos(angle) - np.cos(phase), np.sin(angle) - np.sin(phase), 0.0])
 
 
 def _tow(world: World, phase: float) -> Callable[[], int]:
     """Returns what tows a hose for 10 ms and counts hundredths of a simulated second."""
     start = world.site_positions()[:-1]
     driver = Driver(world)
-    radius = 0.04
     n_steps = round(0.01 / world.timestep)
 
     def work() -> int:
-        angle = phase + _TOW / radius * world.time
-        turn = radius * np.array([np.cos(angle) - np.cos(phase), np.sin(angle) - np.sin(phase), 0])
-        driver.drive_to(start + turn)
+        driver.drive_to(start + _find_turn(phase, world.time))
         for _ in range(n_steps):
             driver.update()
             world.step()

@@ -63,18 +63,17 @@ class Rollout:
         world: in which it was.
         outcome: how it ended.
         wall_s: of planning and the episode (s).
-        recording_s: of that, spent on recording.
+        overhead: time that recording took over that of the rest, see `_Timed`.
     """
 
     world: World
     outcome: Outcome
     wall_s: float
-    recording_s: float
+    overhead: float
 
     def to_record(self, args: Args) -> dict[str, Any]:
         """The document's fields."""
         outcome = self.outcome
-        rest = self.wall_s - self.recording_s
         return {
             "model": self.world.hose_model,
             "scene": args.scene,
@@ -85,7 +84,7 @@ class Rollout:
             "stalled": outcome.stalled,
             "recording": str(args.save) if args.save else None,
             "wall_s": self.wall_s,
-            "recording_overhead": self.recording_s / rest if rest > 0.0 else 0.0,
+            "recording_overhead": self.overhead,
         }
 
     def describe(self) -> str:
@@ -100,29 +99,35 @@ class Rollout:
 
 
 class _Timed:
-    """An observer that notes what the observers behind it take."""
+    """Observers, and a clock for what they take of the run.
+
+    Planning, the observers' start (which compiles) and their end (which completes files) are left
+    out: what counts is every sample, over the policy, the steps and the checks in between.
+
+    Args:
+        observers: all that watch.
+    """
 
     def __init__(self, observers: Sequence[Observer]) -> None:
         self._observers = tuple(observers)
-        self.seconds = 0.0
+        self._begun = self._spent = 0.0
+        self.overhead = 0.0
 
     def start(self, world: World, monitor: Monitor, settings: Mapping[str, str]) -> None:
-        begun = time.perf_counter()
         for observer in self._observers:
             observer.start(world, monitor, settings)
-        self.seconds += time.perf_counter() - begun
+        self._begun = time.perf_counter()
 
     def sample(self, world: World, monitor: Monitor, info: Mapping[str, Any]) -> None:
         begun = time.perf_counter()
         for observer in self._observers:
             observer.sample(world, monitor, info)
-        self.seconds += time.perf_counter() - begun
+        self._spent += time.perf_counter() - begun
 
     def finish(self, outcome: Outcome) -> None:
-        begun = time.perf_counter()
+        self.overhead = self._spent / (time.perf_counter() - self._begun - self._spent)
         for observer in self._observers:
             observer.finish(outcome)
-        self.seconds += time.perf_counter() - begun
 
 
 def run(args: Args) -> int:
@@ -177,4 +182,4 @@ def _roll_out(args: Args, scene: Scene, model: str, recording: Recording) -> Rol
         generator=np.random.default_rng(args.seed),
         settings=settings,
     )
-    return Rollout(world, outcome, time.perf_counter() - begun, timed.seconds)
+    return Rollout(world, outcome, time.perf_counter() - begun, timed.overhead)

@@ -44,6 +44,9 @@ class Background:
         most: stretches that wait at most.
         patience_s: how long `end` waits for a lossy sink (s).
         give_up: called when a lossy sink has not finished in that time.
+
+    Attributes:
+        lossy: as given.
     """
 
     def __init__(
@@ -55,7 +58,7 @@ class Background:
         patience_s: float = 1.0,
         give_up: Callable[[], None] | None = None,
     ) -> None:
-        self._sink, self._name, self._lossy = sink, name, lossy
+        self._sink, self._name, self.lossy = sink, name, lossy
         self._most, self._patience, self._give_up = most, patience_s, give_up
         self._jobs: queue.Queue[Callable[[], None] | None] = queue.Queue()
         self._error: BaseException | None = None
@@ -66,7 +69,7 @@ class Background:
     def begin(self, stage: Stage) -> None:
         """Begins an episode."""
         if self._thread is not None:
-            self._thread.join(self._patience if self._lossy else None)
+            self._thread.join(self._patience if self.lossy else None)
         self._dropping = self._thread is not None and self._thread.is_alive()
         if self._dropping:
             self._complain()
@@ -80,7 +83,7 @@ class Background:
 
     def add(self, samples: Samples) -> None:
         """Adds a stretch."""
-        if not self._lossy:
+        if not self.lossy:
             self._raise()
         self._put(lambda: self._sink.add(samples))
 
@@ -89,8 +92,8 @@ class Background:
         assert self._thread is not None, "begin() comes first"
         self._put(lambda: self._sink.end(outcome), must=True)
         self._put(None, must=True)
-        self._thread.join(self._patience if self._lossy else None)
-        if not self._lossy:
+        self._thread.join(self._patience if self.lossy else None)
+        if not self.lossy:
             self._raise()
         elif self._thread.is_alive() or self._error is not None:
             self._complain()
@@ -99,7 +102,7 @@ class Background:
 
     def _put(self, job: Callable[[], None] | None, must: bool = False) -> None:
         """Queues a job; what a lossy sink must hear always finds room, the rest may be lost."""
-        if not self._lossy:
+        if not self.lossy:
             self._jobs.put(job)
         elif self._dropping or not (must or self._jobs.qsize() < self._most):
             self._complain()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hose_mj.hoses.model import Array
 from hose_mj.recording.sinks import Sink
 from hose_mj.recording.stage import Stage
 from hose_mj.recording.world_episode import (
@@ -19,8 +20,8 @@ from hose_mj.recording.world_episode import (
 from hose_mj.rollout.staging import N_POINTS, Cast, HoseReader, make_stage
 from hose_mj.world.world import World
 
-CHUNK = 64
-"""Samples that are handed over at once."""
+CHUNK, LIVE_CHUNK = 512, 12
+"""Samples that are handed over at once: to files, and where somebody watches."""
 
 
 class Capture:
@@ -44,6 +45,7 @@ class Capture:
         n_points: int = N_POINTS,
     ) -> None:
         self._sinks, self._keep, self._most, self._n_points = tuple(sinks), keep, most, n_points
+        self._is_live = any(getattr(sink, "lossy", False) for sink in sinks)
         self.stage: Stage | None = None
         self._cast: Cast | None = None
         self._reader: HoseReader | None = None
@@ -54,12 +56,17 @@ class Capture:
     def start(
         self, world: World, monitor: Any | None, settings: Mapping[str, Any] | None = None
     ) -> None:
-        """Begins an episode; nothing is recorded yet but the stage."""
+        """Begins an episode; nothing is recorded yet but the stage.
+
+        The world is read once for nothing, so that what numba compiles when it is first called is
+        compiled before the episode runs.
+        """
         self.stage, self._cast = make_stage(world, monitor, settings or {}, self._n_points)
         self._reader = HoseReader(world, self.stage.arc_lengths)
-        self._chunk = SampleBuffer(self.stage, CHUNK)
+        self._chunk = SampleBuffer(self.stage, LIVE_CHUNK if self._is_live else CHUNK)
         self._kept = SampleBuffer(self.stage, self._most) if self._keep else None
         self._outcome = None
+        self._read(world)
         for sink in self._sinks:
             sink.begin(self.stage)
 
@@ -75,14 +82,10 @@ class Capture:
                 it is), `vetoed` and `events` (names), `margins` (M,), if they have been measured
                 at this state already.
         """
-        stage, cast, chunk, info = self.stage, self._cast, self._chunk, info or {}
-        assert stage is not None, "start() comes first"
-        assert cast is not None
-        assert chunk is not None
+        chunk, info = self._chunk, info or {}
+        assert chunk is not None, "start() comes first"
         if chunk.is_full:
             self._hand_over()
-        assert self._reader is not None
-        control_points, hose = self._reader.read(world)
         margins = info.get("margins")
         if margins is None:
             margins = monitor.measure() if monitor is not None else np.zeros(0)
@@ -90,14 +93,8 @@ class Capture:
             "time": world.time,
             "turn": info.get("turn", NO_TURN),
             "reward": info.get("reward", 0.0),
-            "positions": world.data.xpos[cast.bodies],
-            "quaternions": world.data.xquat[cast.bodies],
-            "hose": hose,
-            "control_points": control_points,
-            "tension": world.tension(stage.arc_lengths),
-            "attachments": world.site_positions(),
-            "forces": world.attachment_forces(),
             "margins": margins,
+            **self._read(world),
         }
         vetoed, events = ", ".join(info.get("vetoed", ())), ", ".join(info.get("events", ()))
         chunk.append(info.get("owner", "") or "", vetoed, events, **numbers)
@@ -128,6 +125,22 @@ class Capture:
 
     def __exit__(self, *_: object) -> None:
         self.finish()
+
+    def _read(self, world: World) -> dict[str, Array]:
+        """Returns what a sample holds of the world as it stands."""
+        assert self.stage is not None
+        assert self._cast is not None
+        assert self._reader is not None
+        control_points, hose = self._reader.read(world)
+        return {
+            "positions": world.data.xpos[self._cast.bodies],
+            "quaternions": world.data.xquat[self._cast.bodies],
+            "hose": hose,
+            "control_points": control_points,
+            "tension": world.tension(self.stage.arc_lengths),
+            "attachments": world.site_positions(),
+            "forces": world.attachment_forces(),
+        }
 
     def _hand_over(self) -> None:
         if self._chunk is None or not len(self._chunk):

@@ -14,8 +14,8 @@ from hose_mj.errors import InputError
 from hose_mj.world.world import World
 
 Ending = Literal["break", "goal", "duration"]
-SAMPLE_RATE = 50.0
-"""Samples per simulated second."""
+SAMPLE_RATE = 25.0
+"""Samples per simulated second: what a film shows."""
 
 
 class Policy(Protocol):
@@ -52,7 +52,13 @@ class Observer(Protocol):
         ...
 
     def sample(self, world: World, monitor: Monitor, info: Mapping[str, Any]) -> None:
-        """Called at the start, then at the sampling rate, and at the end."""
+        """Called at the start, then at the sampling rate, and at the end.
+
+        Args:
+            world: as it stands.
+            monitor: has just checked it.
+            info: what `Policy.describe` says, and `margins`, those of the monitor.
+        """
         ...
 
     def finish(self, outcome: Outcome) -> None:
@@ -153,6 +159,6 @@ def run_episode(
 
 def _sample(observers: Sequence[Observer], world: World, monitor: Monitor, policy: Policy) -> None:
     if observers:
-        info = policy.describe()
+        info = {**policy.describe(), "margins": monitor.margins}
         for observer in observers:
             observer.sample(world, monitor, info)

@@ -22,7 +22,7 @@ help:
 	@echo 'make demo        install, then compare the hose models in short form (report in out/demo)'
 	@echo '                 and on a garden hose (report in out/demo/garden_hose)'
 	@echo 'make test        install with the dev extra, then ruff, mypy and pytest'
-	@echo '                 PYTEST_ARGS="tests/tools -x" goes to pytest'
+	@echo '                 PYTEST_ARGS="tests/cli -x" goes to pytest'
 	@echo 'make test-slow   only the slow tests, which make test leaves out'
 	@echo 'make test-mujoco4  the flex rod and GEDS under MuJoCo 4, in a virtual environment of its own'
 	@echo 'make lint        only ruff and mypy'
@@ -45,7 +45,7 @@ test-slow: $(DEV)
 # Under MuJoCo 4 dm-control does not load and the composite cable is gone: only what is left runs.
 test-mujoco4: $(NEXT)
 	$(NEXT_BIN)/python -m pytest -m 'not slow' -k 'mujoco4 or flex or geds' $(PYTEST_ARGS) \
-	  tests/hoses/test_mujoco4.py tests/hoses/test_flex.py tests/contracts
+	  tests/hoses/mujoco/test_mujoco4.py tests/hoses/mujoco/test_flex.py tests/contracts
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -33,10 +33,10 @@ def test_contents(wheel):
         (entry_points,) = (archive.read(n) for n in names if n.endswith("/entry_points.txt"))
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == {
-        *("hose_mj", "learning", "tools"),
+        *("hose_mj", "hose_learning"),
     }
-    assert {"hose_mj/py.typed", "hose_mj/errors.py", "learning/__init__.py"} <= names
-    assert b"hose-mj = tools.cli:main" in entry_points
+    assert {"hose_mj/py.typed", "hose_mj/errors.py", "hose_learning/__init__.py"} <= names
+    assert b"hose-mj = hose_mj.cli.main:main" in entry_points
     assert not [name for name in names if "__pycache__" in name or name.endswith(".rrd")]
 
 
@@ -52,7 +52,8 @@ def test_every_asset_is_inside(wheel):
 def test_the_materials_are_found_in_the_wheel(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path)
     code = (
-        "from hose_mj.assets import find_assets; from hose_mj.scenes.own_hose import read_own_hose;"
+        "from hose_mj.assets import find_assets;"
+        "from hose_mj.scenes.hose_file.hose_file import read_own_hose;"
         "print(find_assets(), read_own_hose(find_assets() / 'hoses' / 'usb_cable.toml').title)"
     )
     done = subprocess.run(
@@ -71,7 +72,8 @@ def test_the_materials_are_found_in_the_wheel(wheel, tmp_path):
 def test_the_doctor_runs_from_the_wheel(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path)
     code = (
-        "import sys, hose_mj; from tools.cli import main; print(hose_mj.__file__, file=sys.stderr)"
+        "import sys, hose_mj; from hose_mj.cli.main import main;"
+        "print(hose_mj.__file__, file=sys.stderr)"
     )
     done = subprocess.run(
         [sys.executable, "-c", f"{code}; sys.exit(main(['doctor', '--json']))"],

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from hose_mj import HoseSpec
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.plot_twist import plot_twist
+from hose_mj.recording.plots.twist import plot_twist
 
 CONTROL_POINTS = 16
 SPEC = HoseSpec(

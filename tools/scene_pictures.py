@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.plot_style import encode_png, make_figure
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.recording.plots.style import encode_png, make_figure
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 
 SHOWN = (("floor_1", "floor_4", "floor_6"), ("corridor", "deck", "lift"))
 CAMERA = "overview"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds.shapes import CAPSULE, CYLINDER, SPHERE
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.world import World
 
 TOUCH, TOUCH_RADII = 2e-3, 0.05

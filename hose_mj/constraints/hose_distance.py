@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
 from hose_mj.hoses.geds.shapes import measure
+from hose_mj.jit import kernel
 
 _PARTS = 4
 """Parts of a piece between which f is looked at."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.centre_line import CentreLine
 
 CHORDS = 4

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import kernel
 from hose_mj.constraints.hose_distance import (
     find_nearest,
     find_point,
@@ -16,6 +15,7 @@ from hose_mj.constraints.hose_distance import (
     update_balls,
 )
 from hose_mj.hoses.geds.shapes import BOUND, KIND, POSITION, ROTATION, SIZE, measure
+from hose_mj.jit import kernel
 
 OTHER_KIND = -1.0
 """In a row of hoses/geds/shapes.py: a geom of which only the bounding ball counts here."""

@@ -24,7 +24,7 @@ from hose_mj.hoses.geds.shapes import (
     SIZE,
     SPHERE,
 )
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.world import World
 
 Ints = NDArray[np.int64]

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hose_mj.compiled import compile_notice
 from hose_mj.constraints import margin_kernels as kernels
 from hose_mj.constraints.breaks import (
     BOUNDS,
@@ -26,7 +25,8 @@ from hose_mj.constraints.hose_probe import HoseProbe
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.margin_tables import make_tables
 from hose_mj.hoses.geds.shapes import KIND
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import compile_notice
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.world import World
 

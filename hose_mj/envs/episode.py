@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hose_mj.compiled import compile_notice
 from hose_mj.envs import kernels
 from hose_mj.errors import InputError
+from hose_mj.jit import compile_notice
 from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
 from hose_mj.tasks.stream import Stream, make_stream
 from hose_mj.tasks.task import Task

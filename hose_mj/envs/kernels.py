@@ -12,7 +12,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.compiled import jitable, kernel
+from hose_mj.jit import jitable, kernel
 from hose_mj.tasks.kernels import (
     TURN,
     Floats,

@@ -21,11 +21,11 @@ from hose_mj.envs.picture import (
     Rgb,
 )
 from hose_mj.tasks.kernels import STEPS, Integers
-from hose_mj.tasks.line_kernels import ABSENT, Line
+from hose_mj.tasks.line.kernels import ABSENT, Line
 from hose_mj.tasks.task import Task
-from hose_mj.tasks.taxi import STATIONS
-from hose_mj.tasks.taxi_kernels import WIDTH, Taxi
-from hose_mj.tasks.tiny_kernels import Corridor, Maze
+from hose_mj.tasks.taxi.kernels import WIDTH, Taxi
+from hose_mj.tasks.taxi.settings import STATIONS
+from hose_mj.tasks.tiny.kernels import Corridor, Maze
 
 GOAL_COLOR: Rgb = (34, 139, 87)
 STATION_COLORS: dict[str, Rgb] = {

@@ -15,13 +15,13 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from hose_mj.compiled import compile_notice
 from hose_mj.envs import kernels
 from hose_mj.envs.episode import check_moves, choose_signals, compute_team_signals, sum_signals
 from hose_mj.envs.gym import make_action_space
 from hose_mj.envs.options import build_task, refuse_reset_options
 from hose_mj.envs.view import Form, View
 from hose_mj.errors import InputError
+from hose_mj.jit import compile_notice
 from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.model import Array, Curve
+from hose_mj.hoses.protocol import Array, Curve
 
 
 def check_count(name: str, value: object, least: int, most: int | None = None) -> int:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_choice, check_count, check_vector
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
 
 KINDS = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.model import HoseModel
+from hose_mj.hoses.protocol import HoseModel
 from hose_mj.hoses.spec import HoseSpec
 
 
@@ -32,19 +32,19 @@ class ModelEntry:
 
 MODELS: dict[str, ModelEntry] = {
     "geds": ModelEntry(
-        "hose_mj.hoses.geds.model:GedsHose",
+        "hose_mj.hoses.geds.hose:GedsHose",
         "geometrically exact dynamic spline, implicit in time",
     ),
     "cable": ModelEntry(
-        "hose_mj.hoses.cable:CableHose",
+        "hose_mj.hoses.mujoco.cable:CableHose",
         "MuJoCo's composite cable: rigid segments, ball joints, explicit elastic forces",
     ),
     "flex": ModelEntry(
-        "hose_mj.hoses.flex:FlexHose",
+        "hose_mj.hoses.mujoco.flex:FlexHose",
         "MuJoCo's 1-D flex: point masses, rigid edges, implicit bending, no twist",
     ),
     "hinge-chain": ModelEntry(
-        "hose_mj.hoses.hinge_chain:HingeChainHose",
+        "hose_mj.hoses.mujoco.hinge_chain:HingeChainHose",
         "planar chain of hinges and joint springs in MuJoCo, for validation only",
     ),
 }

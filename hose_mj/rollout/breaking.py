@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.rollout.obstacles import Obstacles, find_footprint
 from hose_mj.rollout.scripts import Script, move, relax
 from hose_mj.world.driving import Driver

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.recording.sinks import Sink
 from hose_mj.recording.stage import Stage
 from hose_mj.recording.world_episode import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from hose_mj.hoses.geds.basis import DEGREE, make_knots
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.recording.stage import WORLD, Geom, Margin, Rgba, Stage
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.world import World

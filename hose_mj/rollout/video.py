@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.recording.files import make_temp_beside, replace_atomically
 from hose_mj.recording.tension import color_tension
 from hose_mj.recording.world_episode import WorldEpisode
-from hose_mj.scenes.mjcf import Scene
+from hose_mj.scenes.mjcf.scene import Scene
 
 CAMERA = "overview"
 _MOST_SAMPLES = 4  # per pixel: more takes long where there is no graphics card

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hose_mj.compiled import jitable
+from hose_mj.jit import jitable
 from hose_mj.tasks.kernels import Integers, dispatched
 
 CANCELLED = 7

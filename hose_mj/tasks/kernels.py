@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 from numba.extending import overload
 
-from hose_mj.compiled import compiled, jitable
+from hose_mj.jit import compiled, jitable
 from hose_mj.tasks.stream import draw_below
 
 TURN, STEPS = 0, 1

@@ -35,8 +35,8 @@ class TaskEntry:
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
 
-_LINE = ("hose_mj.tasks.line", "LineSettings", "make_line")
-_TAXI = ("hose_mj.tasks.taxi", "TaxiSettings", "make_taxi")
+_LINE = ("hose_mj.tasks.line.settings", "LineSettings", "make_line")
+_TAXI = ("hose_mj.tasks.taxi.settings", "TaxiSettings", "make_taxi")
 TASKS: dict[str, TaskEntry] = {
     "line": TaskEntry(
         *_LINE,
@@ -79,13 +79,13 @@ TASKS: dict[str, TaskEntry] = {
         {"single_agent": True},
     ),
     "corridor": TaskEntry(
-        "hose_mj.tasks.tiny",
+        "hose_mj.tasks.tiny.settings",
         "CorridorSettings",
         "make_corridor",
         "two robots in a corridor of three cells (Example 1, section 6.4)",
     ),
     "maze": TaskEntry(
-        "hose_mj.tasks.tiny",
+        "hose_mj.tasks.tiny.settings",
         "MazeSettings",
         "make_maze",
         "one robot among the walls of Table 5.1",

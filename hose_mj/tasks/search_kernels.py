@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hose_mj.compiled import compiled, jitable
+from hose_mj.jit import compiled, jitable
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import STEPS
 

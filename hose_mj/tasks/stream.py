@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.compiled import inlined
+from hose_mj.jit import inlined
 
 Stream = npt.NDArray[np.uint64]
 

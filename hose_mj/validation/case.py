@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.special import j0
 
-from hose_mj.hoses.model import Array, Hold, HoseModel
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.spec import HoseSpec
 
 LENGTH = 1.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.validation.case import Case, Reference
 from hose_mj.validation.run import (
     EQUAL_ERRORS,

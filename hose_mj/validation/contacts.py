@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hose_mj.hoses.model import Array, Hold, HoseModel
 from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
+from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation import reference
 from hose_mj.validation.case import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.hoses.flex import FlexHose
+from hose_mj.hoses.mujoco.flex import FlexHose
 from hose_mj.validation.case import Case
 from hose_mj.validation.cases import find_cases
 from hose_mj.validation.run import simulate

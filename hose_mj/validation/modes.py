@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
-from hose_mj.hoses.model import Array, Linearization
+from hose_mj.hoses.protocol import Array, Linearization
 
 _SAME = 1e-4
 """Relative distance below which two frequencies count as one mode seen in two planes."""

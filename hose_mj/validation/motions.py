@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation.case import (
     GRAVITY,

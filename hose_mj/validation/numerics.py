@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.hoses.geds.model import GedsHose
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.geds.hose import GedsHose
+from hose_mj.hoses.protocol import Array
 from hose_mj.validation import reference
 from hose_mj.validation.case import ROD, Case
 from hose_mj.validation.cases import find_cases

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation.quasistatic_kernels import WIDTH, settle
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
+from hose_mj.jit import compiled, kernel
 
 _AXES = (0.0, 0.0)
 WIDTH = 8

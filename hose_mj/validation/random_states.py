@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.geds.model import GedsHose
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 
 N_STEPS = 3

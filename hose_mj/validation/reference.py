@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 
 
 def _shoot(load: float, weight: float) -> tuple[float, float]:

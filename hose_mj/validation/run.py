@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.validation.case import STIFFENING, Case, Motion, Reference
 from hose_mj.validation.settings import (
     MOST_UNSTABLE,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hose_mj.hoses.model import HoseModel
+from hose_mj.hoses.protocol import HoseModel
 from hose_mj.hoses.registry import make_hose
 from hose_mj.validation.case import Case
 

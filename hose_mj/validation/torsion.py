@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq, fsolve
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 
 BEND_45 = {300.0: (58.78, 22.25, 40.19), 600.0: (47.15, 15.68, 53.47)}

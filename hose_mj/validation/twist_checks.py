@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.hoses.geds.model import GedsHose
-from hose_mj.hoses.model import Array, Hold
+from hose_mj.hoses.geds.hose import GedsHose
+from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.validation.case import LENGTH, ROD, STOUT, Case
 from hose_mj.validation.cases import find_cases
 from hose_mj.validation.numerics import Curves, measure_order

@@ -9,8 +9,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hose_mj.hoses.geds.model import GedsHose
-from hose_mj.hoses.model import Array, Hold, HoseModel
+from hose_mj.hoses.geds.hose import GedsHose
+from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation import torsion
 from hose_mj.validation.case import BENDING_STIFFNESS, LENGTH, STOUT, Case

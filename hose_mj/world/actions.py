@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_choice, check_count
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 

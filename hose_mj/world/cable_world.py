@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.cable import BallJoints
-from hose_mj.hoses.chain_layout import ChainLayout, transport_frames
-from hose_mj.hoses.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.mujoco.cable import BallJoints
+from hose_mj.hoses.mujoco.chain_layout import ChainLayout, transport_frames
+from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
-from hose_mj.scenes.mjcf import Scene
+from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.hose_contact import HoseContact
 from hose_mj.world.mujoco_scene import Numerics
 from hose_mj.world.mujoco_world import MujocoWorld

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 
 _ROUNDS = 50
 _TOLERANCE = 1e-13

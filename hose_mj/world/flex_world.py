@@ -5,14 +5,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.chain_holds import find_rows
-from hose_mj.hoses.flex_layout import FlexLayout
-from hose_mj.hoses.flex_motion import FlexMotion
-from hose_mj.hoses.flex_rod import add_edges, make_rod
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.model import Array, Hold
+from hose_mj.hoses.mujoco.chain_holds import find_rows
+from hose_mj.hoses.mujoco.flex_layout import FlexLayout
+from hose_mj.hoses.mujoco.flex_motion import FlexMotion
+from hose_mj.hoses.mujoco.flex_rod import add_edges, make_rod
+from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.scenes.mjcf import Scene
+from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.hose_contact import HoseContact
 from hose_mj.world.mujoco_scene import PREFIX, Numerics
 from hose_mj.world.mujoco_world import MujocoWorld

@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.model import Array, Hold
-from hose_mj.scenes.mjcf import Scene
+from hose_mj.hoses.protocol import Array, Hold
+from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.coupling import Bodies
 from hose_mj.world.hose_touch import HoseTouch
-from hose_mj.world.laying import count_control_points, relax_hose
+from hose_mj.world.initial_shape import count_control_points, relax_hose
 from hose_mj.world.measured_geoms import add_probe
-from hose_mj.world.pucks import Pucks
+from hose_mj.world.planar_point_robots import Pucks
 from hose_mj.world.world import World
 
 GAP = 1e-6

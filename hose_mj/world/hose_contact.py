@@ -15,10 +15,10 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.model import Array
 from hose_mj.hoses.obstacles import Obstacle
-from hose_mj.scenes.mjcf import Scene
-from hose_mj.scenes.mjcf_model import START
+from hose_mj.hoses.protocol import Array
+from hose_mj.scenes.mjcf.model import START
+from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.scene_geoms import OWN_ARC, SceneGeoms, find_colliding, find_radius
 
 _BITS = 31

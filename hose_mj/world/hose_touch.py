@@ -10,8 +10,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.geds.model import GedsHose
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.geds.hose import GedsHose
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.measured_geoms import Distances, GeomMeter
 from hose_mj.world.scene_geoms import SceneGeoms
 

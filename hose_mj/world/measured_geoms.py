@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 
 PROBE = "hose_mj_probe"
 """Name of a geom, a small sphere that touches nothing, which stands for a point of the hose."""

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.world import World
 
 Indices = npt.NDArray[np.int64]

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.chain_obstacles import IMPEDANCE_RATIO
 from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.mujoco.chain_obstacles import IMPEDANCE_RATIO
 from hose_mj.hoses.spec import check_number
-from hose_mj.scenes.mjcf import Scene
+from hose_mj.scenes.mjcf.scene import Scene
 
 PREFIX = "hose/"
 """Of the names of all that is added to a scene."""

@@ -14,18 +14,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.chain_holds import find_rows
-from hose_mj.hoses.flex_layout import interpolate
 from hose_mj.hoses.inputs import check_arc_lengths, check_count
-from hose_mj.hoses.model import Array
-from hose_mj.hoses.mujoco_chain import check_plain
-from hose_mj.hoses.mujoco_model import Motion, mute_warnings, went_bad
+from hose_mj.hoses.mujoco.chain import check_plain
+from hose_mj.hoses.mujoco.chain_holds import find_rows
+from hose_mj.hoses.mujoco.flex_layout import interpolate
+from hose_mj.hoses.mujoco.model import Motion, mute_warnings, went_bad
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.scenes.mjcf import Scene
+from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.chain_fit import fit_curve
 from hose_mj.world.hose_contact import HoseContact, open_scene
-from hose_mj.world.laying import lay_hose
+from hose_mj.world.initial_shape import lay_hose
 from hose_mj.world.mujoco_scene import PREFIX, Numerics, join_hose
 from hose_mj.world.world import World
 

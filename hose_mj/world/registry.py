@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hose_mj.errors import InputError
-from hose_mj.scenes.mjcf import Scene, find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.cable_world import CableWorld
 from hose_mj.world.flex_world import FlexWorld
 from hose_mj.world.geds_world import GedsWorld

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.model import Array
 from hose_mj.hoses.obstacles import KINDS, Obstacle
+from hose_mj.hoses.protocol import Array
 
 KIND_NAMES = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")): kind for kind in KINDS}
 """MuJoCo's numbers of the shapes that are obstacles, and their names."""

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.motors import Motors, read_moments
 from hose_mj.world.world import World
 

@@ -13,7 +13,7 @@ import math
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.world.motors import Motors
 from hose_mj.world.world import World
 

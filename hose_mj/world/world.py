@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_count, check_vector
-from hose_mj.hoses.model import Array
-from hose_mj.scenes.mjcf import Scene
-from hose_mj.scenes.mjcf_model import START
+from hose_mj.hoses.protocol import Array
+from hose_mj.scenes.mjcf.model import START
+from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
 
 

@@ -9,7 +9,7 @@ from hose_mj.constraints.footprints import find_footprint, find_hose_bodies, fin
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 
 BALL = '<geom type="sphere" size=".1"/>'
 

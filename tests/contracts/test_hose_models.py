@@ -1,4 +1,4 @@
-"""What every registered hose model promises, whatever its physics: see hose_mj/hoses/model.py."""
+"""What every registered hose model promises, whatever its physics: see hoses/protocol.py."""
 
 import math
 import re
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.hoses.model import Energies, Hold, HoseModel, Linearization, Momentum, Reaction
+from hose_mj.hoses.protocol import Energies, Hold, HoseModel, Linearization, Momentum, Reaction
 from hose_mj.hoses.registry import MODELS, make_hose
 from hose_mj.hoses.spec import HoseSpec
 

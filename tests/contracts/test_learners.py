@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from hose_learning.learners.catalog import LEARNERS, make_settings
+from hose_learning.settings import Exploration
+from hose_learning.study.saving import describe, flatten, load_memory, remake, save_memory
+from hose_learning.study.training import Training
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.registry import make_task
-from learning.learners.catalog import LEARNERS, make_settings
-from learning.settings import Exploration
-from learning.study.saving import describe, flatten, load_memory, remake, save_memory
-from learning.study.training import Training
 
 TASKS = {
     "maze": {},

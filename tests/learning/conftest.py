@@ -5,6 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from hose_learning import loop, tables
+from hose_learning.evaluation import make_probe
+from hose_learning.learners import catalog
+from hose_learning.settings import Exploration
+from hose_learning.study.saving import flatten
+from hose_learning.study.training import Training
+from hose_learning.tables import find
 
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import OVER
@@ -12,13 +19,6 @@ from hose_mj.tasks.kernels import HEADER
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.task import Task, make_reward_table
 from hose_mj.tasks.variables import Variable
-from learning import loop, tables
-from learning.evaluation import make_probe
-from learning.learners import catalog
-from learning.settings import Exploration
-from learning.study.saving import flatten
-from learning.study.training import Training
-from learning.tables import find
 
 
 class Chain:
@@ -98,7 +98,7 @@ def make_training():
 @pytest.fixture
 def shrink_tables(monkeypatch):
     """Lets hashed tables begin small; rules that ask for their size are to know the real one."""
-    importlib.import_module("learning.learners.traces")
+    importlib.import_module("hose_learning.learners.traces")
     return lambda capacity: monkeypatch.setattr(tables, "FIRST_CAPACITY", capacity)
 
 

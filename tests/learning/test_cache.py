@@ -10,9 +10,9 @@ import gc, json
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from hose_mj.tasks.registry import make_task
-from learning import evaluation, loop
-from learning.learners import catalog
-from learning.study.training import Training
+from hose_learning import evaluation, loop
+from hose_learning.learners import catalog
+from hose_learning.study.training import Training
 
 task = make_task("corridor")
 settings = catalog.make_settings("d-rr-ql", task)
@@ -20,7 +20,7 @@ training = Training(task, "d-rr-ql", settings, np.random.default_rng(0))
 training.advance(moves=1000)
 training.test(2)
 dispatchers = [k for k in gc.get_objects() if isinstance(k, Dispatcher)]
-ours = [k for k in dispatchers if k.__module__.startswith(("hose_mj", "learning"))]
+ours = [k for k in dispatchers if k.__module__.startswith(("hose_mj", "hose_learning"))]
 misses = sum(sum(k.stats.cache_misses.values()) for k in ours)
 loops = loop.run_turns, evaluation.run_tests
 print(json.dumps([misses, *(sum(k.stats.cache_hits.values()) for k in loops)]))

@@ -7,10 +7,10 @@ import shlex
 from pathlib import Path
 
 import pytest
+from hose_learning.learners.catalog import LEARNERS
 
-from learning.learners.catalog import LEARNERS
-from tools.cli import parse_arguments
-from tools.learning_curves import Args, check_arguments
+from hose_mj.cli.learning_curves import Args, check_arguments
+from hose_mj.cli.main import parse_arguments
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "learners"

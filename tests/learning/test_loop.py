@@ -4,18 +4,18 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning import loop
+from hose_learning.learners import catalog
+from hose_learning.records import EPSILON, FRESH, TEMPERATURE
+from hose_learning.settings import Exploration
+from hose_learning.study import training as study
+from hose_learning.tables import find
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import enumerate_turns
 from hose_mj.tasks.kernels import STEPS
 from hose_mj.tasks.registry import make_task
-from learning import loop
-from learning.learners import catalog
-from learning.records import EPSILON, FRESH, TEMPERATURE
-from learning.settings import Exploration
-from learning.study import training as study
-from learning.tables import find
 
 TURNS = [id for id, entry in catalog.LEARNERS.items() if entry.schedule == "turns"]
 RULES = ("d-rr-ql", "rr-q", "d-rr-ql-messages", "d-rr-ql-traces", "risk-q")

@@ -4,9 +4,8 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-
-from learning.mediators import MEDIATORS, find_above_thresholds, find_highest, mediate
-from learning.tables import make_table
+from hose_learning.mediators import MEDIATORS, find_above_thresholds, find_highest, mediate
+from hose_learning.tables import make_table
 
 N_AGENTS, N_MODULES, N_STATES, N_ACTIONS = 2, 3, 5, 6
 FakeLearner = namedtuple("FakeLearner", "bases mediator thresholds")

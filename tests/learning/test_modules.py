@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-
-from hose_mj.errors import InputError
-from hose_mj.tasks.registry import make_task
-from learning import loop
-from learning.learner import make_learner
-from learning.modules import (
+from hose_learning import loop
+from hose_learning.learner import make_learner
+from hose_learning.modules import (
     Module,
     make_action_masks,
     make_arrays,
     make_event_masks,
     make_module_rewards,
 )
-from learning.settings import LearnerSettings
+from hose_learning.settings import LearnerSettings
+
+from hose_mj.errors import InputError
+from hose_mj.tasks.registry import make_task
 
 SEEN = (("d_g", "theta_g"), (), ("p",))
 

@@ -4,9 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.stats import chisquare
-
-from learning.policies import (
+from hose_learning.policies import (
     count_allowed,
     draw_allowed,
     draw_soft_max,
@@ -14,6 +12,7 @@ from learning.policies import (
     find_best,
     find_lowest_bit,
 )
+from scipy.stats import chisquare
 
 N = 4
 SETS = range(1, 2**N)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from hose_learning.learner import make_learner
+from hose_learning.presets import VALUES, VETOES, find_parts, make_modules
+from hose_learning.settings import LearnerSettings
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import TASKS, make_task
-from learning.learner import make_learner
-from learning.presets import VALUES, VETOES, find_parts, make_modules
-from learning.settings import LearnerSettings
 
 SMALL = {"line": {"n_robots": 2, "half_width": 3, "hose_length": 6}}
 

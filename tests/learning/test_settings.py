@@ -3,12 +3,12 @@
 import math
 
 import pytest
+from hose_learning.learners import catalog
+from hose_learning.modules import Module
+from hose_learning.settings import Exploration, LearnerSettings
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import make_task
-from learning.learners import catalog
-from learning.modules import Module
-from learning.settings import Exploration, LearnerSettings
 
 GOAL = (Module(name="goal", variables=()),)
 

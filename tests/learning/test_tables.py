@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from hose_learning import tables
+from hose_learning.tables import Table, claim, count_free, find, grow, is_sound, make_table
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from learning import tables
-from learning.tables import Table, claim, count_free, find, grow, is_sound, make_table
 
 LARGEST = 2**62
 keys = st.one_of(

@@ -7,7 +7,7 @@ from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording.page import Page, Picture
 from hose_mj.recording.page_checks import group_checks
-from hose_mj.recording.plots import plot_series
+from hose_mj.recording.plots.api import plot_series
 
 NASTY = "<script>alert('&\"')</script>"
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.world import World
 

@@ -11,7 +11,7 @@ from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.rollout.episode import run_episode
 from hose_mj.rollout.policies import POLICIES, make_policy
-from hose_mj.scenes.mjcf import list_scenes
+from hose_mj.scenes.mjcf.scene import list_scenes
 from hose_mj.world.registry import make_world
 
 KINDS = ("stretch", "run-over", "collision", "obstacle", "bounds")

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hose_mj.scenes.mjcf import find_scene, list_scenes, read_scene
+from hose_mj.scenes.mjcf.scene import find_scene, list_scenes, read_scene
 
 FLOORS = [f"floor_{n}" for n in range(1, 7)]
 CELL = 0.05

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
+from reference_tasks.line import LineTwin
+from reference_tasks.taxi import TaxiTwin
+from reference_tasks.tiny import CorridorTwin, MazeTwin
+from reference_tasks.twin import TwinStream
 
 from hose_mj.tasks import kernels
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.twins.line import LineTwin
-from hose_mj.tasks.twins.taxi import TaxiTwin
-from hose_mj.tasks.twins.tiny import CorridorTwin, MazeTwin
-from hose_mj.tasks.twins.twin import TwinStream
 
 TWINS = {"line": LineTwin, "taxi": TaxiTwin, "corridor": CorridorTwin, "maze": MazeTwin}
 SEED = 0x9E3779B97F4A7C15

@@ -5,17 +5,17 @@ import pytest
 import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_tasks import line as twin
+from reference_tasks.line import LineTwin
 
 from hose_mj.tasks import kernels
-from hose_mj.tasks.line_geometry import (
+from hose_mj.tasks.line.geometry import (
     covers,
     make_cover_table,
     make_direction_table,
     make_distance_table,
 )
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.twins import line as twin
-from hose_mj.tasks.twins.line import LineTwin
 
 UP, DOWN, LEFT, RIGHT, NONE = range(5)
 near = st.integers(-6, 6)

@@ -1,8 +1,8 @@
 import numpy as np
 import scipy.stats
+from reference_tasks.twin import TwinStream
 
 from hose_mj.tasks.stream import draw_below, draw_bits, draw_unit, make_stream
-from hose_mj.tasks.twins.twin import TwinStream
 
 
 def test_published_vectors():

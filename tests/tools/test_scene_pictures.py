@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hose_mj.scenes.mjcf import list_scenes
+from hose_mj.scenes.mjcf.scene import list_scenes
 from tools import scene_pictures
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hose_mj.hoses.model import Linearization
+from hose_mj.hoses.protocol import Linearization
 from hose_mj.validation.modes import compute_critical_load, compute_frequencies
 from hose_mj.validation.reference import beam_frequencies
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.validation import numerics, random_states
 from hose_mj.validation.random_states import make_random_hose, run_random_states
 

@@ -3,7 +3,7 @@
 import pytest
 
 from hose_mj import HoseSpec, make_hose
-from hose_mj.scenes.mjcf import read_scene
+from hose_mj.scenes.mjcf.scene import read_scene
 
 HOSE = {"length": 1.0, "radius": 0.01, "axial_stiffness": 1e4, "bending_stiffness": 0.02}
 HOSE |= {"linear_density": 0.1}

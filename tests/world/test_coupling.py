@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import schemes
+from hose_mj.hoses.geds import integrators as schemes
 from hose_mj.hoses.geds.point_masses import PointMasses
 from hose_mj.hoses.geds.shapes import ROW
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 from hose_mj.world.coupling import Bodies
 from hose_mj.world.geds_world import GedsWorld
 

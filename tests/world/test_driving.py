@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.scenes.mjcf import Scene, find_scene, list_scenes, read_scene
+from hose_mj.scenes.mjcf.scene import Scene, find_scene, list_scenes, read_scene
 from hose_mj.world.actions import Actions
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.driving import BANDWIDTH, Driver

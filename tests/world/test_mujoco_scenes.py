@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError, StepError
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 from hose_mj.world.cable_world import CableWorld, find_stable_step
 from hose_mj.world.flex_world import FlexWorld
 from hose_mj.world.scene_geoms import OWN_ARC, find_radius

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hose_mj.scenes.mjcf import find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 from hose_mj.world.chain_fit import Pin, fit_chain
 from hose_mj.world.registry import make_world
 

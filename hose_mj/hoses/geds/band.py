@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import inlined, kernel
+from hose_mj.jit import inlined, kernel
 
 
 @kernel

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hose_mj.compiled import compiled, inlined
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import compiled, inlined
 
 DEGREE = 3
 MASS_WEIGHTS = np.polynomial.legendre.leggauss(4)[1] / 2.0

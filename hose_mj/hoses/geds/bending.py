@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import inlined
 from hose_mj.hoses.geds.span import compute_inverse_square
+from hose_mj.jit import inlined
 
 
 @inlined

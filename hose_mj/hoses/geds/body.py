@@ -8,15 +8,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, frames, mechanics, schemes
-from hose_mj.hoses.geds.holds import HoldSet
+from hose_mj.hoses.geds import basis, energy, frames, mechanics
+from hose_mj.hoses.geds import integrators as schemes
+from hose_mj.hoses.geds.constraints import HoldSet
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_arc_lengths, check_vector, sample_curve, sample_velocity
-from hose_mj.hoses.model import Array, Curve, Energies, Momentum
+from hose_mj.hoses.protocol import Array, Curve, Energies, Momentum
 from hose_mj.hoses.spec import HoseSpec
+from hose_mj.jit import run_kernel
 
 
 class SplineBody:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compiled, inlined, kernel
 from hose_mj.hoses.geds.contact_law import (
     DAMPING,
     WIDTH,
@@ -24,6 +23,7 @@ from hose_mj.hoses.geds.contact_law import (
     is_span_near,
 )
 from hose_mj.hoses.geds.shapes import POSITION, SCALE
+from hose_mj.jit import compiled, inlined, kernel
 
 
 @kernel

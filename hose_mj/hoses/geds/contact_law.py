@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import kernel
 from hose_mj.hoses.geds.shapes import (
     FRICTION,
     POSITION,
@@ -25,7 +24,8 @@ from hose_mj.hoses.geds.shapes import (
     is_near,
     measure,
 )
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import kernel
 
 STIFFNESS, WIDTH, DAMPING, SLIP, RADIUS, TOLERANCE, SELF_STIFFNESS, SELF_DAMPING, ROUND = range(9)
 """Places in `Contact.law`; ROUND is the way round a closed loop (m), infinite in an open hose."""

@@ -15,11 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import choose_by_unknowns, inlined, kernel
 from hose_mj.hoses.geds.basis import find_kind
 from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
 from hose_mj.hoses.geds.frames import move_clamp_frames
-from hose_mj.hoses.geds.frenet import add_frenet, compute_frenet_energy
 from hose_mj.hoses.geds.rod import compute_rod_strains, set_rod
 from hose_mj.hoses.geds.span import (
     compute_derivatives,
@@ -29,6 +27,8 @@ from hose_mj.hoses.geds.span import (
     load_span,
 )
 from hose_mj.hoses.geds.twist import add_twist, close_stretches, open_stretches
+from hose_mj.jit import choose_by_unknowns, inlined, kernel
+from hose_mj.validation.frenet import add_frenet, compute_frenet_energy
 
 
 @kernel

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 
 

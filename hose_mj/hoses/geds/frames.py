@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compiled, inlined, kernel
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.rod import move_frame
 from hose_mj.hoses.geds.span import compute_derivatives
 from hose_mj.hoses.geds.twist import carry, compute_tangent
+from hose_mj.jit import compiled, inlined, kernel
 
 LARGEST_GATHERED = 0.01
 """Twist rate of the frames times a span's length (rad) above which they are laid anew.

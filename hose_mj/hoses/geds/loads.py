@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.hoses.geds import solver
+from hose_mj.hoses.geds import newton as solver
 from hose_mj.hoses.geds.contact_law import Contact
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_vector
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 
 
 class LoadSet:

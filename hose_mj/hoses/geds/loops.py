@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_vector
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
 
 LARGEST_GAP = 0.1

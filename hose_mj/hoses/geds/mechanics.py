@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compile_notice, run_kernel
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, schemes, solver
+from hose_mj.hoses.geds import basis, energy
+from hose_mj.hoses.geds import integrators as schemes
+from hose_mj.hoses.geds import newton as solver
 from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.fittings import average_density, average_stiffness, make_cells
-from hose_mj.hoses.geds.frenet import SMALLEST_BEND
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
-from hose_mj.hoses.model import Array, Linearization
+from hose_mj.hoses.protocol import Array, Linearization
 from hose_mj.hoses.spec import HoseSpec
+from hose_mj.jit import compile_notice, run_kernel
+from hose_mj.validation.frenet import SMALLEST_BEND
 
 _ENDLESS = float(np.finfo(np.float64).max)
 

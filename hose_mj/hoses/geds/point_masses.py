@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
 from hose_mj.hoses.geds.contact import compute_forces
-from hose_mj.hoses.geds.schemes import end_step, take_step
+from hose_mj.hoses.geds.integrators import end_step, take_step
+from hose_mj.hoses.geds.newton import DONE, VERDICTS, make_work
 from hose_mj.hoses.geds.shapes import POSITION, VELOCITY, measure
-from hose_mj.hoses.geds.solver import DONE, VERDICTS, make_work
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import compiled, kernel
 
 NEAR = len(VERDICTS)
 """Verdict: a mass may meet something in the next step."""

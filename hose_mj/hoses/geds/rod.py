@@ -26,8 +26,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import inlined
 from hose_mj.hoses.geds.span import SMALLEST_A
+from hose_mj.jit import inlined
 
 TANGENT, SLOPE, DIRECTOR, RATE = 0, 3, 6, 9
 """Where a row of the frames (F, 10) has t, t', d and m."""

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.contact import press, scatter
 from hose_mj.hoses.geds.contact_law import (
     RADIUS,
@@ -27,6 +26,7 @@ from hose_mj.hoses.geds.contact_law import (
     evaluate,
     make_push,
 )
+from hose_mj.jit import inlined, kernel
 
 REACH = 6.0
 """Arc between stretches that may touch, in radii."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.compiled import compiled, kernel
+from hose_mj.jit import compiled, kernel
 
 PLANE, SPHERE, CAPSULE, CYLINDER, BOX = 0, 2, 3, 5, 6
 """Kinds, the codes of MuJoCo's mjtGeom. The axis of plane, capsule and cylinder is the local z."""

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import compiled, inlined
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import compiled, inlined
 
 SMALLEST_A = 0.01
 """A below which |a| and A are continued by polynomials."""

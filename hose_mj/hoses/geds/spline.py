@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis
 from hose_mj.hoses.inputs import check_arc_lengths, check_count, check_vector
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
 
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 FEWEST_CONTROL_POINTS = 5

@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import run_kernel
-from hose_mj.hoses.geds import frames, schemes, solver, twist
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.geds import frames, twist
+from hose_mj.hoses.geds import integrators as schemes
+from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import run_kernel
 
 MOST_LOAD_STEPS = 64
 _STATIC_TOLERANCE = 1e-10

@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds.capsules import check_capsules
-from hose_mj.hoses.geds.contact_set import ContactSet
+from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.integrators import State
 from hose_mj.hoses.geds.loads import LoadSet
-from hose_mj.hoses.geds.schemes import State
 from hose_mj.hoses.inputs import check_arc_lengths
-from hose_mj.hoses.model import Array, Reaction
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 

@@ -27,9 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.compiled import inlined, kernel
 from hose_mj.hoses.geds.span import compute_derivatives
-from hose_mj.hoses.model import Array
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import inlined, kernel
 
 
 class Twist(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.palette import OTHERS, Rgb, lighten
+from hose_mj.recording.plots.palette import OTHERS, Rgb, lighten
 from hose_mj.recording.rerun.parts import OUTCOME, TIMELINE, TURNS, make_time
 from hose_mj.recording.rerun.world_stage import (
     Look,

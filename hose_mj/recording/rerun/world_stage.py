@@ -11,7 +11,7 @@ import rerun as rr
 
 from hose_mj.recording.captions import format_table
 from hose_mj.recording.episode import Array
-from hose_mj.recording.palette import Rgb, mix
+from hose_mj.recording.plots.palette import Rgb, mix
 from hose_mj.recording.rerun.parts import log_document
 from hose_mj.recording.stage import WORLD, Geom, Rgba, Stage
 from hose_mj.recording.tension import make_scale

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.spec import HoseSpec
 
 EI, DENSITY = 0.05, 0.1

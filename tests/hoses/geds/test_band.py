@@ -3,7 +3,9 @@ import pytest
 import scipy.linalg
 
 from hose_mj.hoses.geds import band as banded
-from hose_mj.hoses.geds import mechanics, solver, stretches
+from hose_mj.hoses.geds import mechanics
+from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.geds import twist_segments as stretches
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import HoseSpec
 

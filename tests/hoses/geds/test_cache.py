@@ -6,7 +6,7 @@ import sys
 PROGRAM = """
 import gc, json
 from numba.core.dispatcher import Dispatcher
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.spec import HoseSpec
 
 spec = HoseSpec(length=1.0, axial_stiffness=1e4, bending_stiffness=0.05, linear_density=0.1)

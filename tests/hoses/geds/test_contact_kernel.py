@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.hoses.geds import contact, mechanics, shapes
-from hose_mj.hoses.geds.contact_set import ContactSet
+from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import basis, energy, mechanics, solver, stretches
+from hose_mj.hoses.geds import basis, energy, mechanics
+from hose_mj.hoses.geds import newton as solver
 from hose_mj.hoses.geds import span as spans
+from hose_mj.hoses.geds import twist_segments as stretches
 from hose_mj.hoses.geds.spline import Spline
 
 N, LENGTH = 8, 1.0

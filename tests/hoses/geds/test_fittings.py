@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.spec import Fitting, HoseSpec
 
 EA, EI, GJ, DENSITY = 5e4, 0.05, 0.04, 0.1

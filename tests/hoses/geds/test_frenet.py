@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hose_mj import HoseSpec, InputError
-from hose_mj.hoses.geds import basis, energy, frames, mechanics, stretches
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds import basis, energy, frames, mechanics
+from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 

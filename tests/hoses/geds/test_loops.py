@@ -5,8 +5,8 @@ import pytest
 import scipy.linalg
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.loops import make_circle
-from hose_mj.hoses.geds.model import GedsHose
 from hose_mj.hoses.obstacles import ContactLaw
 from hose_mj.hoses.spec import HoseSpec
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.spec import HoseSpec
 
 EI, GJ = 0.05, 0.04

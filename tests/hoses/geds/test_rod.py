@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import basis, energy, frames, mechanics, rod, schemes, solver, stretches
+from hose_mj.hoses.geds import basis, energy, frames, mechanics, rod
+from hose_mj.hoses.geds import integrators as schemes
+from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.geds import twist_segments as stretches
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import HoseSpec

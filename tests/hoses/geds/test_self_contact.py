@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds.hose_contact import HosePair
+from hose_mj.hoses.geds.hose_pair import HosePair
 from hose_mj.hoses.obstacles import ContactLaw
 
 RADIUS = 0.01

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import contact_set, shapes
+from hose_mj.hoses.geds import contacts as contact_set
+from hose_mj.hoses.geds import shapes
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from hose_mj.compiled import run_kernel
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, mechanics, stretches, twist
-from hose_mj.hoses.geds.model import GedsHose
+from hose_mj.hoses.geds import basis, mechanics, twist
+from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import Fitting, HoseSpec
+from hose_mj.jit import run_kernel
 
 EI, GJ, DENSITY, GRAVITY = 0.05, 0.04, 0.1, 9.81
 X, Y, Z = np.eye(3)

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
+from hose_learning.mdp.explicit_mdp import MarkovModel
 from scipy.sparse import csr_array
-
-from learning.components.markov import MarkovModel
 
 
 def make_model(moves, rewards, terminal, actions=("a", "b")):

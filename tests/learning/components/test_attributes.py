@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hose_learning.experience import record_experience
+from hose_learning.prediction.attributes import GRID_VARIABLES, Encoding, make_attributes
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import TASKS, make_task
-from learning.components.attributes import GRID_VARIABLES, Encoding, make_attributes
-from learning.components.experience import record_experience
 
 
 def make_log(id):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from hose_mj.errors import InputError
-from learning.components.classifiers import (
+from hose_learning.prediction.classifiers import (
     CLASSIFIERS,
     Setup,
     count_split_attributes,
     make_classifier,
 )
-from learning.components.published import read_table
-from learning.components.stand_ins import ClusterClassifier, NaiveBayesTree, RbfNetwork
+from hose_learning.prediction.published import read_table
+from hose_learning.prediction.weka_substitutes import ClusterClassifier, NaiveBayesTree, RbfNetwork
+
+from hose_mj.errors import InputError
 
 
 def make_blobs(n=200, share=0.3, gap=4.0):

@@ -1,8 +1,6 @@
 import numpy as np
 import pytest
-
-from hose_mj.errors import InputError
-from learning.components.consensus import (
+from hose_learning.consensus.clocks import (
     ConsensusSettings,
     Messages,
     compute_clocks,
@@ -12,10 +10,12 @@ from learning.components.consensus import (
     run_clocks,
     simulate,
 )
-from learning.components.consensus_measures import (
+from hose_learning.consensus.consensus_measures import (
     count_disorder,
     count_overlaps,
 )
+
+from hose_mj.errors import InputError
 
 STEP = 0.02
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-
-from learning.components.consensus import Action, ConsensusSettings, Record, simulate
-from learning.components.consensus_measures import (
+from hose_learning.consensus.clocks import Action, ConsensusSettings, Record, simulate
+from hose_learning.consensus.consensus_measures import (
     compute_leads,
     compute_longest_action,
     count_disorder,

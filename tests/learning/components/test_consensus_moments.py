@@ -2,15 +2,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-
-from learning.components.consensus import (
+from hose_learning.consensus.clocks import (
     ConsensusSettings,
     Messages,
     compute_clocks,
     draw_rates,
     run_clocks,
 )
-from learning.components.consensus_moments import (
+from hose_learning.consensus.second_moments import (
     compute_contraction,
     compute_disagreement,
     compute_speed,

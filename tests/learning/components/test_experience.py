@@ -6,6 +6,15 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hose_learning.experience import (
+    Experience,
+    make_rows,
+    read_experience,
+    record_experience,
+    write_experience,
+)
+from hose_learning.experience_kernels import Rows, fill_rows
+from hose_learning.policies import draw_allowed
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
@@ -14,15 +23,6 @@ from hose_mj.tasks.registry import TASKS, make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 from hose_mj.tasks.variables import Variable
-from learning.components.experience import (
-    Experience,
-    make_rows,
-    read_experience,
-    record_experience,
-    write_experience,
-)
-from learning.components.experience_kernels import Rows, fill_rows
-from learning.policies import draw_allowed
 
 
 def make_generator(seed=5):

@@ -8,15 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from hose_mj.tasks import kernels
-from hose_mj.tasks.exact import OVER, enumerate_joint, enumerate_turns, solve
-from hose_mj.tasks.kernels import HEADER, TURN, begin, end_turn
-from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.stream import draw_unit, make_stream
-from hose_mj.tasks.task import Task
-from hose_mj.tasks.variables import Variable
-from learning.components.joint_policy import (
+from hose_learning.learners import catalog
+from hose_learning.mdp.joint_policy import (
     NOBODY,
     Estimates,
     choose,
@@ -27,10 +20,17 @@ from learning.components.joint_policy import (
     make_key,
     play_composed,
 )
-from learning.components.q_values import make_evaluate
-from learning.learners import catalog
-from learning.settings import Exploration
-from learning.study.training import Training
+from hose_learning.mdp.q_values import make_evaluate
+from hose_learning.settings import Exploration
+from hose_learning.study.training import Training
+
+from hose_mj.tasks import kernels
+from hose_mj.tasks.exact import OVER, enumerate_joint, enumerate_turns, solve
+from hose_mj.tasks.kernels import HEADER, TURN, begin, end_turn
+from hose_mj.tasks.registry import make_task
+from hose_mj.tasks.stream import draw_unit, make_stream
+from hose_mj.tasks.task import Task
+from hose_mj.tasks.variables import Variable
 
 GAMMA = 0.9
 LEFT, RIGHT, NONE = 0, 1, 2

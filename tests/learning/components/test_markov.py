@@ -1,12 +1,6 @@
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
-
-from hose_mj.errors import InputError
-from hose_mj.tasks import exact
-from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.stream import make_stream
-from learning.components.markov import (
+from hose_learning.mdp.explicit_mdp import (
     MarkovModel,
     compute_worth,
     describe_state,
@@ -15,6 +9,12 @@ from learning.components.markov import (
     solve,
     write_out,
 )
+from scipy.sparse import csr_array
+
+from hose_mj.errors import InputError
+from hose_mj.tasks import exact
+from hose_mj.tasks.registry import make_task
+from hose_mj.tasks.stream import make_stream
 
 GAMMA = 0.9
 LINE = {"n_robots": 2, "hose_length": 4, "half_width": 2, "start": ((2, 0), (1, 0))}

@@ -9,6 +9,12 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TimeLimit
+from hose_learning.action_masks import MaskedEnv, VetoMasks
+from hose_learning.learners import catalog
+from hose_learning.mask_kernels import find_unvetoed
+from hose_learning.shared_policy import SharedPolicyEnv
+from hose_learning.study.training import Training
+from hose_learning.tables import FIRST_CAPACITY, SLOTS_PER_KEY
 
 import hose_mj.envs  # noqa: F401  (registers the ids)
 from hose_mj.envs.gym import TaskEnv
@@ -21,12 +27,6 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 from hose_mj.tasks.variables import Variable
-from learning.components.mask_kernels import find_unvetoed
-from learning.components.masks import MaskedEnv, VetoMasks
-from learning.components.shared_policy import SharedPolicyEnv
-from learning.learners import catalog
-from learning.study.training import Training
-from learning.tables import FIRST_CAPACITY, SLOTS_PER_KEY
 
 
 class Ledge:

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from hose_learning.prediction.cross_validation import compute_score, cross_validate, make_splits
+from hose_learning.prediction.measures import MEASURES, Confusion, count_confusion
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
-from learning.components.cross_validation import compute_score, cross_validate, make_splits
-from learning.components.measures import MEASURES, Confusion, count_confusion
 
 
 def test_measures_by_hand():

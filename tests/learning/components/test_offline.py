@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 import pytest
+from hose_learning.prediction import offline
+from hose_learning.prediction.attributes import Encoding
+from hose_learning.prediction.classifiers import CLASSIFIERS
+from hose_learning.prediction.cross_validation import Score
+from hose_learning.prediction.measures import MEASURES
+from hose_learning.prediction.offline import Plan, Study, list_checks, list_records, run_study
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import make_task
-from learning.components import offline
-from learning.components.attributes import Encoding
-from learning.components.classifiers import CLASSIFIERS
-from learning.components.cross_validation import Score
-from learning.components.measures import MEASURES
-from learning.components.offline import Plan, Study, list_checks, list_records, run_study
 
 SHORT = Plan(cycles=150, repeats=2, folds=3, logs=2, seed=4)
 

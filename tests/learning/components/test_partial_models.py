@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
-
-from hose_mj.errors import InputError
-from learning.components.markov import MarkovModel, solve
-from learning.components.partial_models import (
+from hose_learning.mdp.explicit_mdp import MarkovModel, solve
+from hose_learning.mdp.partially_constrained import (
     choose_greedy,
     compute_propositions,
     find_violations,
 )
+from scipy.sparse import csr_array
+
+from hose_mj.errors import InputError
 
 GAMMA = 0.9
 N_SOURCE, N_HIDDEN, N_ACTIONS = 7, 3, 3

@@ -4,13 +4,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning.mdp.partially_constrained import compute_propositions, find_violations
+from hose_learning.mdp.task_pairs import PAIRS, make_tasks, project_state, write_pair
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import HEADER, TURN
 from hose_mj.tasks.registry import make_task
-from learning.components.partial_models import compute_propositions, find_violations
-from learning.components.partial_pairs import PAIRS, make_tasks, project_state, write_pair
 
 PCMS = [name for name, pair in PAIRS.items() if not pair.violated]
 

@@ -6,13 +6,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-
-from hose_mj.errors import InputError
-from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import HEADER
-from hose_mj.tasks.registry import make_task
-from learning.components.experience import record_experience
-from learning.components.relevance import (
+from hose_learning.experience import record_experience
+from hose_learning.relevance import (
     Signal,
     count_contradictions,
     count_unexplained,
@@ -24,6 +19,11 @@ from learning.components.relevance import (
     number_rows,
     sort_by_range,
 )
+
+from hose_mj.errors import InputError
+from hose_mj.tasks import kernels
+from hose_mj.tasks.kernels import HEADER
+from hose_mj.tasks.registry import make_task
 
 # Thesis Table 5.1a: x, y, o_up, and whether going up was punished.
 TABLE_51 = np.array(

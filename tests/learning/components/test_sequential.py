@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-
-from hose_mj.errors import InputError
-from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.stream import make_stream
-from learning.components.sequential import (
+from hose_learning.mdp.sequential_realization import (
     Outcome,
     compare,
     move_alone,
     move_jointly,
     study_sequential,
 )
+
+from hose_mj.errors import InputError
+from hose_mj.tasks.registry import make_task
+from hose_mj.tasks.stream import make_stream
 
 LINE = {
     "n_robots": 2,

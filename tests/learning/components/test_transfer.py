@@ -7,6 +7,17 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning.learners import catalog
+from hose_learning.loop import see
+from hose_learning.mdp.joint_policy import make_key
+from hose_learning.mdp.q_values import make_evaluate
+from hose_learning.settings import Exploration
+from hose_learning.study.training import Training
+from hose_learning.tables import claim, find, make_table
+from hose_learning.transfer import transfer as transfer_module
+from hose_learning.transfer import trial as transfer_trial
+from hose_learning.transfer.transfer import transfer
+from hose_learning.transfer.trial import Plan, list_vetoes, make_tasks, run_trial
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
@@ -14,17 +25,6 @@ from hose_mj.tasks.exact import enumerate_turns
 from hose_mj.tasks.kernels import TURN
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import draw_below, make_stream
-from learning.components import transfer as transfer_module
-from learning.components import transfer_trial
-from learning.components.joint_policy import make_key
-from learning.components.q_values import make_evaluate
-from learning.components.transfer import transfer
-from learning.components.transfer_trial import Plan, list_vetoes, make_tasks, run_trial
-from learning.learners import catalog
-from learning.loop import see
-from learning.settings import Exploration
-from learning.study.training import Training
-from learning.tables import claim, find, make_table
 
 ONE_TAXI = {"starts": ((2, 2),), "passengers": (("R", "B"),)}
 TWO_PASSENGERS = {"starts": ((2, 2),), "passengers": (("R", "B"), ("G", "Y"))}

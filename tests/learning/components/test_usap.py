@@ -5,6 +5,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 import pytest
+from hose_learning.experience import record_experience
+from hose_learning.prediction import usap_kernels
+from hose_learning.prediction.usap import UndesiredPredictor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.ensemble import RandomForestClassifier
@@ -14,9 +17,6 @@ from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import draw_below, make_stream
-from learning.components import usap_kernels
-from learning.components.experience import record_experience
-from learning.components.usap import UndesiredPredictor
 
 TAXI = make_task("taxi", step_limit=10**9)
 N_VARIABLES, N_ACTIONS = len(TAXI.variables), TAXI.n_actions

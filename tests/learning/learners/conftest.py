@@ -3,15 +3,15 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning import rules
+from hose_learning.loop import gather_joint, keep_keys, run_joint, see
+from hose_learning.modules import Module
+from hose_learning.records import make_log
+from hose_learning.settings import Exploration, LearnerSettings
 
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import enumerate_joint
 from hose_mj.tasks.registry import make_task
-from learning import rules
-from learning.loop import gather_joint, keep_keys, run_joint, see
-from learning.modules import Module
-from learning.records import make_log
-from learning.settings import Exploration, LearnerSettings
 
 STATES = {
     "corridor": ("p_0", "p_1"),
@@ -28,7 +28,7 @@ class Trainee:
     def __init__(self, file, task, modules=None, seed=0, epsilon=1.0, **settings):
         state = STATES["line-3" if task.n_agents == 3 else task.id]
         everything = Module(name="everything", variables=state, signals=task.rewards)
-        make = importlib.import_module(f"learning.learners.{file}").make
+        make = importlib.import_module(f"hose_learning.learners.{file}").make
         self.task = task
         self.settings = LearnerSettings(
             modules=modules or (everything,),

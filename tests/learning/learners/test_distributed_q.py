@@ -2,13 +2,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning import rules
+from hose_learning.modules import Module
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import solve
 from hose_mj.tasks.registry import make_task
-from learning import rules
-from learning.modules import Module
 
 GAMMA = 0.9
 RIGHT, LEFT, NONE = 1, 0, 2

@@ -4,12 +4,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning import rules
+from hose_learning.learners.coordination import find_edge_key
+from hose_learning.modules import Module
+from hose_learning.records import EPISODES, FRESH
 
 from hose_mj.tasks import kernels
-from learning import rules
-from learning.learners.coordination import find_edge_key
-from learning.modules import Module
-from learning.records import EPISODES, FRESH
 
 ALPHA, GAMMA = 0.3, 0.9
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from hose_learning import rules
+from hose_learning.learners.joint import allow_fallbacks
+from hose_learning.loop import run_joint
+from hose_learning.modules import Module
+from hose_learning.tables import find
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import make_task
-from learning import rules
-from learning.learners.joint import allow_fallbacks
-from learning.loop import run_joint
-from learning.modules import Module
-from learning.tables import find
 
 CASES = {
     "d-ql": ("distributed_q", {}),

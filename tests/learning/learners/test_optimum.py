@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from hose_learning.settings import Exploration
 
 from hose_mj.tasks.exact import discount_cycles, enumerate_turns, solve
 from hose_mj.tasks.registry import make_task
-from learning.settings import Exploration
 
 GAMMA = 0.9
 CORRIDORS = [

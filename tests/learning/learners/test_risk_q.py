@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from hose_learning.learners.risk_q import GOAL, RISK
+from hose_learning.records import XI
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.exact import enumerate_turns
-from learning.learners.risk_q import GOAL, RISK
-from learning.records import XI
 
 
 def write_out(task):

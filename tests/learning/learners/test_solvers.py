@@ -2,11 +2,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning.learners.coordination import make_scratch
+from hose_learning.learners.graphs import make_graph, order_elimination, read_edges
+from hose_learning.learners.solvers import ASCENT, ELIMINATION, MAX_PLUS, compute_payoff, maximize
 
 from hose_mj.errors import InputError
-from learning.learners.coordination import make_scratch
-from learning.learners.graphs import make_graph, order_elimination, read_edges
-from learning.learners.solvers import ASCENT, ELIMINATION, MAX_PLUS, compute_payoff, maximize
 
 N_ACTIONS = 3
 

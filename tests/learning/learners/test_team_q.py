@@ -2,16 +2,16 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning import rules
+from hose_learning.learners.team_q import draw_best, make, number_joint, write_joint
+from hose_learning.modules import Module
+from hose_learning.settings import Exploration, LearnerSettings
+from hose_learning.tables import DENSE_WIDTH, LARGEST_DENSE, make_table
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import solve
 from hose_mj.tasks.registry import make_task
-from learning import rules
-from learning.learners.team_q import draw_best, make, number_joint, write_joint
-from learning.modules import Module
-from learning.settings import Exploration, LearnerSettings
-from learning.tables import DENSE_WIDTH, LARGEST_DENSE, make_table
 
 GAMMA = 0.9
 

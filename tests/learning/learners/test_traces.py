@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hose_learning import rules
+from hose_learning.learners import round_robin, traces
+from hose_learning.records import Memory
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import make_task
-from learning import rules
-from learning.learners import round_robin, traces
-from learning.records import Memory
 
 GAMMA, ALPHA, LAMBDA = 0.9, 0.5, 0.8
 PLAIN = {"values": "monolithic", "vetoes": "none"}

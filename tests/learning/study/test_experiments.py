@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
-
-from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.search import find_shortest
-from hose_mj.tasks.stream import make_stream
-from learning.study.experiments import (
+from hose_learning.study.experiments import (
     EXPERIMENTS,
     HOSES,
     N_CONFIGURATIONS,
     make_configuration,
 )
-from learning.study.jobs import make_training
+from hose_learning.study.jobs import make_training
+
+from hose_mj.tasks.registry import make_task
+from hose_mj.tasks.search import find_shortest
+from hose_mj.tasks.stream import make_stream
 
 SEEDS = range(10)
 every_experiment = pytest.mark.parametrize("id", EXPERIMENTS)

@@ -3,9 +3,8 @@ import json
 
 import numpy as np
 import pytest
-
-from learning.study import jobs
-from learning.study.jobs import Job, do, do_all
+from hose_learning.study import jobs
+from hose_learning.study.jobs import Job, do, do_all
 
 SHORT = Job(
     name="short",

@@ -1,9 +1,9 @@
 """The measures of chapter 6 on tasks where they are known."""
 
 import pytest
+from hose_learning.study.measures import measure
 
 from hose_mj.tasks.registry import make_task
-from learning.study.measures import measure
 
 
 def test_a_forced_way_is_measured_exactly(make_chain, make_training):

@@ -6,15 +6,15 @@ import json
 
 import numpy as np
 import pytest
+from hose_learning.learners import catalog
+from hose_learning.modules import Module
+from hose_learning.settings import Exploration, LearnerSettings
+from hose_learning.study import saving
+from hose_learning.study.run_folder import CHECKPOINT, CONFIG, RunFolder
+from hose_learning.study.training import Training
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import make_task
-from learning.learners import catalog
-from learning.modules import Module
-from learning.settings import Exploration, LearnerSettings
-from learning.study import saving
-from learning.study.run_folder import CHECKPOINT, CONFIG, RunFolder
-from learning.study.training import Training
 
 SETTINGS = LearnerSettings(
     modules=(

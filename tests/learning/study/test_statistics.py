@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from learning.study.statistics import compute_mean_interval, compute_rate_interval
+from hose_learning.study.statistics import compute_mean_interval, compute_rate_interval
 
 Z = 1.959963984540054
 

@@ -1,0 +1,1 @@
+"""Measures of speed, one file for each group of `hose-mj bench`."""

@@ -1,0 +1,190 @@
+"""`hose-mj consensus`: agents agree on whose turn it is (thesis section 6.5)."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from hose_mj.checks import Check
+from hose_mj.cli.check_table import print_checks
+from hose_mj.errors import InputError
+from hose_mj.recording.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_learning.consensus.clocks import ConsensusSettings, Record
+
+LOSSES = (0.0, 0.1, 0.5)
+"""Shares of lost messages that are always tried, beside the one asked for."""
+LARGEST_SPREAD = 0.05
+"""Disagreement that counts as agreement, in turns."""
+SETTLING_TURNS, MEASURED_TURNS = 10, 40
+SCATTER = 1.2
+"""What chance may add to a disagreement measured over so many turns."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Simulate turns by consensus: each agent has a clock, and messages are lost and late.
+
+    Every loss of 0, 10 and 50 % is tried, and the one given. Checked are that clocks which begin
+    turns apart agree, that they stay within the exact value of their disagreement, that the order
+    of turns is kept and that no two agents act at once. Times are in turns.
+    """
+
+    agents: int = 4
+    """Number of agents."""
+    loss: float = 0.1
+    """Probability that a message is lost."""
+    delay: int = 1
+    """Largest delay of a message, in rounds of messages; each has a random one up to it."""
+    drift: float = 0.02
+    """Largest relative error of a clock's rate."""
+    rounds: int = 50
+    """Rounds of messages in one turn."""
+    action_time: float = 0.5
+    """Longest action, in turns; durations are random up to it."""
+    wait: bool = False
+    """Let each turn run out instead of giving it to the next agent when the action is done."""
+    falls_back: bool = False
+    """Let clocks fall back below a turn that they have reached, as the thesis has it."""
+    turns: int = 60
+    """Turns to play."""
+    out: Path = Path("out/consensus")
+    """Folder for the picture."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """Seed of everything random."""
+
+
+class Trial(NamedTuple):
+    """One loss: clocks alone, agents that act by them, and what was measured.
+
+    Attributes:
+        settings: the network.
+        clocks: clocks that run alone.
+        play: agents that act.
+        record: numbers for the document.
+    """
+
+    settings: ConsensusSettings
+    clocks: Record
+    play: Record
+    record: dict[str, float]
+
+
+def run(args: Args) -> int:
+    """Runs the trials; 1 if a check failed."""
+    from hose_learning.consensus.pictures import draw_consensus
+
+    from hose_mj.recording.files import write_atomically
+
+    if args.seed < 0:
+        raise InputError("seed", args.seed, "a whole number, at least 0")
+    asked = make_settings(args)
+    losses = sorted({*LOSSES, asked.loss})
+    trials = [run_trial(replace(asked, loss=loss), args.seed) for loss in losses]
+    checks = [check for trial in trials for check in make_checks(trial)]
+    picture = args.out / "consensus.png"
+    own = next(trial for trial in trials if trial.settings.loss == asked.loss)
+    write_atomically(picture, draw_consensus(trials, own))
+    if args.json:
+        results = {"records": [trial.record for trial in trials], "picture": picture}
+        print_document(make_document("consensus", args, checks=checks, results=results))
+    else:
+        _summarize(trials)
+        print_checks(checks)
+    passed = sum(check.ok for check in checks)
+    stream = sys.stderr if args.json else sys.stdout
+    print(f"{passed} of {len(checks)} checks ok\npicture: {picture}", file=stream)
+    return 0 if passed == len(checks) else 1
+
+
+def make_settings(args: Args) -> ConsensusSettings:
+    """Makes the settings that the arguments describe."""
+    from hose_learning.consensus.clocks import ConsensusSettings
+
+    return ConsensusSettings(
+        n_agents=args.agents,
+        loss=args.loss,
+        delay=args.delay,
+        drift=args.drift,
+        rounds=args.rounds,
+        n_turns=args.turns,
+        action_time=args.action_time,
+        early_finish=not args.wait,
+        falls_back=args.falls_back,
+    )
+
+
+def run_trial(settings: ConsensusSettings, seed: int) -> Trial:
+    """Simulates one loss, twice: clocks alone, and agents that act by them."""
+    import numpy as np
+    from hose_learning.consensus import clocks as consensus
+    from hose_learning.consensus import consensus_measures
+    from hose_learning.consensus import second_moments as consensus_moments
+
+    alone, playing = np.random.default_rng(seed).spawn(2)
+    settling = SETTLING_TURNS * settings.rounds
+    n_rounds = settling + MEASURED_TURNS * settings.rounds
+    clocks = consensus.run_clocks(settings, alone, n_rounds)
+    play = consensus.simulate(settings, playing)
+    leads = consensus_measures.compute_leads(play)
+    lead = float(leads.max()) if len(leads) else 1.0  # clocks so coarse that they skip all turns
+    reached = (play.clocks.max(axis=1) >= settings.first_turn).argmax()
+    duration = (len(play.times) - reached) * settings.round_time  # the last round is over too
+    record = {
+        "loss": settings.loss,
+        "first_spread": float(play.spreads[0]),
+        "agreed_spread": float(play.spreads[reached]),
+        "disagreement": float(np.sqrt(clocks.clocks[settling:].var(axis=1).mean())),
+        "exact_disagreement": consensus_moments.compute_disagreement(settings, clocks.rates),
+        "actions": len(play.actions),
+        "disorder": consensus_measures.count_disorder(play.actions, settings),
+        "overlaps": consensus_measures.count_overlaps(play.actions),
+        "longest_safe_action": consensus_measures.compute_longest_action(lead, settings.drift),
+        "turns_per_time": settings.n_turns / float(duration),
+    }
+    return Trial(settings, clocks, play, record)
+
+
+def make_checks(trial: Trial) -> list[Check]:
+    """Makes the checks of one loss."""
+    found = trial.record
+    name = f"loss {100.0 * trial.settings.loss:g} %: "
+    exact = SCATTER * found["exact_disagreement"] + 1e-9  # equal clocks differ by rounding alone
+    return [
+        Check(name + "spread when the first turn begins", found["agreed_spread"], LARGEST_SPREAD),
+        Check(name + "disagreement against its exact value", found["disagreement"], exact),
+        Check(name + "turns out of order", found["disorder"], 0, "=="),
+        Check(name + "actions begun during another", found["overlaps"], 0, "=="),
+        Check(
+            name + "longest action that is surely safe",
+            found["longest_safe_action"],
+            trial.settings.action_time,
+            ">=",
+        ),
+    ]
+
+
+def _summarize(trials: list[Trial]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    settings = asdict(trials[0].settings)
+    table = Table(title=f"{settings['n_agents']} clocks in consensus (unit: one turn)")
+    columns = {
+        "lost": ("loss", "{:.0%}"),
+        "first spread": ("first_spread", "{:.3g}"),
+        "spread, agreed": ("agreed_spread", "{:.2g}"),
+        "disagreement": ("disagreement", "{:.3g}"),
+        "exact": ("exact_disagreement", "{:.3g}"),
+        "turns per unit": ("turns_per_time", "{:.3g}"),
+    }
+    for name in columns:
+        table.add_column(name, justify="right")
+    for trial in trials:
+        table.add_row(*(form.format(trial.record[key]) for key, form in columns.values()))
+    Console().print(table)

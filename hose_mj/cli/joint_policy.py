@@ -1,0 +1,146 @@
+"""`hose-mj joint-policy`: joint moves composed from what agents learned in turns (section 6.4)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from hose_mj.cli.check_table import print_checks
+from hose_mj.cli.task_options import parse_options
+from hose_mj.errors import InputError
+from hose_mj.recording.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_learning.mdp.joint_policy import JointMove
+    from hose_learning.study.training import Training
+
+    from hose_mj.tasks.task import Task
+
+LARGEST = 20_000
+"""Most states of a task whose joint optimum is searched."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Let agents learn in turns, and compose what they learned into joint moves.
+
+    Each agent estimates from further play what its moves do. The composed policy is then played
+    from one initial state and held against the fewest joint moves there are, which a search over
+    all joint moves finds: so the task has to be a small one.
+    """
+
+    task: Annotated[str, tyro.conf.Positional] = "corridor"
+    """Id of the task."""
+    learner: str = "d-rr-ql"
+    """A learner whose agents move in turns."""
+    set: tuple[str, ...] = ()
+    """Options of the task, as n_robots=3 goal=(2,1)."""
+    episodes: int = 2000
+    """Episodes to train for; epsilon falls from 1 to 0 over half of them."""
+    moves: int = 20_000
+    """Moves of single agents that transitions and rewards are estimated from."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """Seed of the training, the play and the initial state."""
+
+
+def run(args: Args) -> int:
+    """Learns and composes; 1 if the joint moves do not reach the goal, or not the shortest way."""
+    import numpy as np
+    from hose_learning.mdp.joint_policy import count_fewest_moves, estimate, play_composed
+    from hose_learning.mdp.q_values import make_evaluate
+
+    from hose_mj.checks import Check
+    from hose_mj.tasks.exact import enumerate_joint
+    from hose_mj.tasks.registry import make_task
+    from hose_mj.tasks.stream import make_stream
+
+    _check(args)
+    begun = time.perf_counter()
+    task = make_task(args.task, **parse_options(args.set))
+    training_seed, play_seed, start_seed = np.random.default_rng(args.seed).spawn(3)
+    start = task.reset(make_stream(start_seed))
+    fewest = count_fewest_moves(enumerate_joint(task, [start], LARGEST), task.kernel.success)
+    if fewest is None:
+        raise InputError("initial state", start.tolist(), "one from which the goal can be reached")
+    training = _train(task, args, training_seed)
+    evaluate = make_evaluate(training)
+    estimates = estimate(task, evaluate, args.moves, play_seed)
+    discount = training.settings.discount
+    most = max(1, task.step_limit // task.n_agents)
+    moves = play_composed(task, start, estimates, evaluate, discount, most)
+    reached = bool(moves[-1].events & task.kernel.success)
+    checks = [
+        Check("the joint moves reach the goal (1 yes, 0 no)", float(reached), 1, "=="),
+        Check("joint moves, against the fewest there are", len(moves), fewest),
+    ]
+    if args.json:
+        results = {"joint_moves": _list(task, moves), "reached": reached, "fewest": fewest}
+        print_document(make_document("joint-policy", args, checks=checks, results=results))
+    else:
+        _print(task, moves)
+        print_checks(checks)
+    passed = sum(check.ok for check in checks)
+    seconds = time.perf_counter() - begun
+    stream = sys.stderr if args.json else sys.stdout
+    print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
+    return 0 if passed == len(checks) else 1
+
+
+def _check(args: Args) -> None:
+    from hose_learning.learners import catalog
+
+    for name, least in (("episodes", 1), ("moves", 1), ("seed", 0)):
+        if getattr(args, name) < least:
+            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    if not catalog.find_learner(args.learner).composes:
+        known = [id for id, entry in catalog.LEARNERS.items() if entry.composes]
+        raise InputError("learner", args.learner, "one of " + ", ".join(known))
+
+
+def _train(task: Task, args: Args, generator: Any) -> Training:
+    from hose_learning.learners import catalog
+    from hose_learning.settings import Exploration
+    from hose_learning.study.training import Training
+
+    from hose_mj.jit import compile_notice
+
+    exploration = Exploration(per_episode=min(1.0, 2.0 / args.episodes))
+    settings = catalog.make_settings(args.learner, task, exploration=exploration)
+    training = Training(task, args.learner, settings, generator)
+    with compile_notice("learner's kernels"):
+        training.advance(episodes=args.episodes)
+    return training
+
+
+def _list(task: Task, moves: list[JointMove]) -> list[dict[str, Any]]:
+    """Each joint move: actions by agent, what was expected, what came of it."""
+    return [
+        {
+            "actions": [task.action_names[a] for a in move.composition.actions],
+            "outcomes": len(move.composition.messages[-1]),
+            "value": move.composition.value,
+            "events": task.name_events(move.events),
+            "state": {name: move.state[part] for name, part in task.layout.items()},
+        }
+        for move in moves
+    ]
+
+
+def _print(task: Task, moves: list[JointMove]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"Joint policy of {task.id} from its initial state")
+    for name in ("move", *task.agents, "value expected", *task.layout, "events"):
+        table.add_column(name)
+    for number, (move, row) in enumerate(zip(moves, _list(task, moves), strict=True), start=1):
+        places = (" ".join(map(str, move.state[part])) for part in task.layout.values())
+        events = ", ".join(row["events"])
+        table.add_row(str(number), *row["actions"], f"{row['value']:.1f}", *places, events)
+    Console().print(table)

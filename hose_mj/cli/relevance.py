@@ -1,0 +1,175 @@
+"""`hose-mj relevance`: which state variables matter for which constraint (Algorithm 5.1)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from hose_mj.cli.check_table import print_checks
+from hose_mj.cli.task_options import parse_options
+from hose_mj.errors import InputError
+from hose_mj.recording.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_learning.relevance import Relevance
+    from rich.table import Table
+
+    from hose_mj.checks import Check
+
+WIDEST = 6
+"""Most signals that stand side by side."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Log random moves, and find which state variables matter for which broken constraint.
+
+    What matters is what a veto module has to see. A log can be too short to show it: so the
+    variables found are checked against a fresh log, in which they must tell every event.
+    """
+
+    task: Annotated[str, tyro.conf.Positional]
+    """Id of the task."""
+    moves: int = 10_000
+    """Random moves of single agents to log."""
+    set: tuple[str, ...] = ()
+    """Options of the task, as n_robots=3 goal=(2,1)."""
+    variables: tuple[str, ...] = ()
+    """Variables to test; by default all but the copies of an agent's own."""
+    pooled: bool = False
+    """Compare moves of different agents too, as if their vetoes shared one table."""
+    logs: int = 1
+    """Logs, each with a seed of its own; with several the matrix shows how many agree."""
+    fresh: int = 100_000
+    """Moves of the log that the first log's result is checked against."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """Seed of the moves."""
+
+
+def run(args: Args) -> int:
+    """Runs the algorithm; 1 if a fresh log contradicts what it found."""
+    import numpy as np
+    from hose_learning.experience import record_experience
+    from hose_learning.relevance import (
+        count_unexplained,
+        find_relevance,
+        list_candidates,
+        list_signals,
+    )
+
+    from hose_mj.checks import Check
+    from hose_mj.tasks.registry import make_task
+
+    for name, least in (("moves", 1), ("logs", 1), ("fresh", 1), ("seed", 0)):
+        if getattr(args, name) < least:
+            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    begun = time.perf_counter()
+    task = make_task(args.task, **parse_options(args.set))
+    signals = list_signals(task)
+    *generators, last = np.random.default_rng(args.seed).spawn(args.logs + 1)
+    logs = [record_experience(task, args.moves, generator) for generator in generators]
+    variables = args.variables or list_candidates(task, logs[0])
+    found = [find_relevance(log, signals, variables, args.pooled) for log in logs]
+    fresh = record_experience(task, args.fresh, last)
+    checks = [
+        Check(
+            f"{signal.name}: moves of a fresh log that are not told",
+            count_unexplained(found[0], signal, fresh, args.pooled),
+            0,
+            "==",
+        )
+        for signal in signals
+    ]
+    if args.json:
+        print_document(make_document("relevance", args, checks=checks, results=_list(found)))
+    else:
+        _print(found, checks, f"{args.task}, {args.moves:,} random moves")
+    passed = sum(check.ok for check in checks)
+    seconds = time.perf_counter() - begun
+    stream = sys.stderr if args.json else sys.stdout
+    print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
+    return 0 if passed == len(checks) else 1
+
+
+def _list(found: list[Relevance]) -> dict[str, Any]:
+    """The signals, what matters for them in the first log, and in which share of all logs."""
+    import numpy as np
+
+    first = found[0]
+    share = np.mean([each.relevant for each in found], axis=0)
+    return {
+        "variables": first.variables,
+        "signals": [
+            {
+                "name": signal.name,
+                "event": signal.event,
+                "actions": signal.actions,
+                "seen": int(first.n_seen[place]),
+                "relevant": first.list_relevant(signal),
+                "share_of_logs": dict(zip(first.variables, share[:, place], strict=True)),
+                "most_common": _find_most_common(found, place),
+            }
+            for place, signal in enumerate(first.signals)
+        ],
+    }
+
+
+def _find_most_common(found: list[Relevance], place: int) -> dict[str, Any]:
+    """The variables that most logs agree on for a signal, and how many do."""
+    signal = found[0].signals[place]
+    sets = Counter(each.list_relevant(signal) for each in found)
+    relevant, logs = sets.most_common(1)[0]
+    return {"relevant": relevant, "logs": logs}
+
+
+def _print(found: list[Relevance], checks: list[Check], title: str) -> None:
+    """Prints variables by signals, or a row for each signal where there are many."""
+    from rich.console import Console
+
+    first = found[0]
+    wide = len(first.signals) > WIDEST
+    title += f", {len(found)} logs" if len(found) > 1 else ""
+    Console().print(_make_list(first, title) if wide else _make_matrix(found, title))
+    for place, signal in enumerate(first.signals if len(found) > 1 else ()):
+        most = _find_most_common(found, place)
+        print(f"{signal.name}: {', '.join(most['relevant'])} in {most['logs']} of {len(found)}")
+    print_checks(checks)
+
+
+def _make_matrix(found: list[Relevance], title: str) -> Table:
+    """Variables by signals: a checkmark, or in how many logs one matters."""
+    from rich.table import Table
+
+    first = found[0]
+    table = Table("variable", title=title)
+    for signal in first.signals:
+        table.add_column(signal.name, justify="center")
+    for place, variable in enumerate(first.variables):
+        row = [
+            sum(int(each.relevant[place, k]) for each in found) for k in range(len(first.signals))
+        ]
+        if len(found) == 1:
+            cells = ["✓" if count else "" for count in row]
+        else:
+            cells = [f"{count} of {len(found)}" if count else "" for count in row]
+        table.add_row(variable, *cells)
+    table.add_section()
+    table.add_row("moves with it", *(f"{int(n):,}" for n in first.n_seen))
+    return table
+
+
+def _make_list(first: Relevance, title: str) -> Table:
+    """What matters for each signal, in the first log."""
+    from rich.table import Table
+
+    table = Table("signal", "variables that matter", "moves with it", title=title)
+    for signal, n_seen in zip(first.signals, first.n_seen.tolist(), strict=True):
+        table.add_row(signal.name, ", ".join(first.list_relevant(signal)), f"{n_seen:,}")
+    return table

@@ -1,0 +1,185 @@
+"""`hose-mj rollout`: one episode of a policy in a scene, recorded if wanted, and why it ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from hose_mj.cli.rollout_recording import Recording
+from hose_mj.constraints.monitor import Monitor
+from hose_mj.errors import InputError
+from hose_mj.recording.document import make_document, print_document
+from hose_mj.rollout.episode import Observer, Outcome, Policy, run_episode
+from hose_mj.rollout.policies import POLICIES, make_policy
+from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
+from hose_mj.world.registry import WORLDS, make_world
+from hose_mj.world.world import World
+
+
+@dataclass(frozen=True)
+class Args:
+    """Run one episode in a scene with a hose, and say why it ended.
+
+    An episode ends with the first constraint that breaks, with the tip at the goal, or after
+    --duration. Recorded to files and to a live viewer at once, if you like.
+    """
+
+    scene: Annotated[str, tyro.conf.Positional]
+    """A shipped scene (floor_1 to floor_6, corridor, deck, lift), or your own MJCF file."""
+    model: tuple[str, ...] = ("geds",)
+    """The hose's model: geds, cable or flex; of two, both episodes run and are shown overlaid."""
+    policy: str = "to-goal"
+    """random, to-goal, break-stretch, break-run-over, break-collision, break-obstacle,
+    break-bounds, or the run folder of a learner (hose-mj train line)."""
+    duration: float = 5.0
+    """Simulated time after which the episode ends (s)."""
+    save: Path | None = None
+    """Write a Rerun recording, F.rrd; open it with hose-mj view."""
+    spawn: bool = False
+    """Open Rerun's viewer and show the episode while it runs."""
+    connect: str | None = None
+    """Show it in a viewer that listens at this URL, as rerun+http://127.0.0.1:9876/proxy."""
+    mp4: Path | None = None
+    """Write a film."""
+    csv: Path | None = None
+    """Write a table: a row for each sample."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """Seed of everything that is left to chance."""
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """One episode as the document and the terminal show it.
+
+    Attributes:
+        world: in which it was.
+        outcome: how it ended.
+        wall_s: of planning and the episode (s).
+        overhead: time that recording took over that of the rest, see `_Timed`.
+    """
+
+    world: World
+    outcome: Outcome
+    wall_s: float
+    overhead: float
+
+    def to_record(self, args: Args) -> dict[str, Any]:
+        """The document's fields."""
+        outcome = self.outcome
+        return {
+            "model": self.world.hose_model,
+            "scene": args.scene,
+            "steps": outcome.steps,
+            "sim_time": outcome.sim_time,
+            "ended_by": outcome.ended_by,
+            "break": outcome.broken.to_record() if outcome.broken else None,
+            "stalled": outcome.stalled,
+            "recording": str(args.save) if args.save else None,
+            "wall_s": self.wall_s,
+            "recording_overhead": self.overhead,
+        }
+
+    def describe(self) -> str:
+        """One line."""
+        outcome = self.outcome
+        took = f"{outcome.steps:,} steps in {self.wall_s:.1f} s"
+        head = f"{self.world.hose_model}: {outcome.ended_by}"
+        if outcome.broken is not None:
+            return f"{head} ({outcome.broken.kind}), {took}; {outcome.broken.describe()}"
+        end = "the tip is at the goal" if outcome.ended_by == "goal" else "nothing broke"
+        return f"{head} after {outcome.sim_time:.3f} s, {took}; {end}"
+
+
+class _Timed:
+    """Observers, and a clock for what they take of the run.
+
+    Planning, the observers' start (which compiles) and their end (which completes files) are left
+    out: what counts is every sample, over the policy, the steps and the checks in between.
+
+    Args:
+        observers: all that watch.
+    """
+
+    def __init__(self, observers: Sequence[Observer]) -> None:
+        self._observers = tuple(observers)
+        self._begun = self._spent = 0.0
+        self.overhead = 0.0
+
+    def start(self, world: World, monitor: Monitor, settings: Mapping[str, str]) -> None:
+        for observer in self._observers:
+            observer.start(world, monitor, settings)
+        self._begun = time.perf_counter()
+
+    def sample(self, world: World, monitor: Monitor, info: Mapping[str, Any]) -> None:
+        begun = time.perf_counter()
+        for observer in self._observers:
+            observer.sample(world, monitor, info)
+        self._spent += time.perf_counter() - begun
+
+    def finish(self, outcome: Outcome) -> None:
+        self.overhead = self._spent / (time.perf_counter() - self._begun - self._spent)
+        for observer in self._observers:
+            observer.finish(outcome)
+
+
+def run(args: Args) -> int:
+    """Runs the episodes; 0 when done."""
+    _check(args)
+    scene = read_scene(find_scene(args.scene))
+    with Recording(args, scene, len(args.model)) as recording:
+        rollouts = [_roll_out(args, scene, model, recording) for model in args.model]
+    records = [rollout.to_record(args) for rollout in rollouts]
+    if args.json:
+        results = {**records[0], "rollouts": records}
+        print_document(make_document("rollout", args, results=results))
+    else:
+        lines = [rollout.describe() for rollout in rollouts] + recording.describe()
+        print("\n".join(lines))
+    return 0
+
+
+def _check(args: Args) -> None:
+    models = set(args.model)
+    if not 1 <= len(args.model) <= 2 or len(models) != len(args.model) or models - set(WORLDS):
+        valid = f"one or two different ones of {', '.join(WORLDS)}"
+        raise InputError("model", " ".join(args.model), valid)
+    if args.seed < 0:
+        raise InputError("seed", args.seed, "a whole number, at least 0")
+    if not 0.0 < args.duration <= 3600.0:
+        raise InputError("duration", args.duration, "above 0, at most 3600 (s)")
+
+
+def _make_policy(name: str) -> Policy:
+    if name in POLICIES:
+        return make_policy(name)
+    if not Path(name).is_dir():
+        valid = f"{', '.join(POLICIES)}, or the run folder of a learner"
+        raise InputError("policy", name, valid)
+    from hose_mj.cli.saved_learner import SavedLearner
+
+    return SavedLearner(Path(name))
+
+
+def _roll_out(args: Args, scene: Scene, model: str, recording: Recording) -> Rollout:
+    policy = _make_policy(args.policy)
+    world = make_world(scene, model)
+    monitor = Monitor(world)
+    timed = _Timed(recording.make_observers())
+    settings = {"scene": args.scene, "model": model, "policy": args.policy, "seed": str(args.seed)}
+    begun = time.perf_counter()
+    outcome = run_episode(
+        *(world, monitor, policy),
+        duration=args.duration,
+        observers=[timed],
+        generator=np.random.default_rng(args.seed),
+        settings=settings,
+    )
+    return Rollout(world, outcome, time.perf_counter() - begun, timed.overhead)

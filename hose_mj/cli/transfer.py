@@ -1,0 +1,163 @@
+"""`hose-mj transfer`: what is learned on one task as a start on another one (chapter 7)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from hose_mj.cli.check_table import print_checks
+from hose_mj.cli.task_options import parse_options
+from hose_mj.errors import InputError
+from hose_mj.recording.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_learning.transfer.trial import Outcome
+
+
+@dataclass(frozen=True)
+class Args:
+    """Train on a source task, go on with greedy episodes on a target task, and compare.
+
+    The target sees all that the source sees, and may see more and forbid more. Each configuration
+    is learned anew; line tasks get a random start and goal each, the same for both. The control
+    explores the target from scratch for the same cost.
+    """
+
+    source: Annotated[str, tyro.conf.Positional]
+    """Id of the task to learn on first."""
+    target: Annotated[str, tyro.conf.Positional]
+    """Id of the task that it is for."""
+    source_set: tuple[str, ...] = ()
+    """Options of the source, as collision=robots."""
+    target_set: tuple[str, ...] = ()
+    """Options of the target."""
+    moves: int = 300_000
+    """Moves of single agents on the source."""
+    episodes: int = 3
+    """Greedy learning episodes on the target."""
+    configurations: int = 30
+    """How often all this is done."""
+    values: str = "goal"
+    """What the goal modules see: goal (on a line, all robots' formation), local or monolithic."""
+    exchange: tuple[float, ...] = (390_000.0, 1.0)
+    """What a move on the target costs, in moves on the source; the thesis's, and equal cost."""
+    json: bool = False
+    """Print one JSON document on stdout; messages go to stderr."""
+    seed: int = 0
+    """Seed of all that is left to chance."""
+
+
+def run(args: Args) -> int:
+    """Runs all configurations; 1 if a veto was lost or the first control did better."""
+    from hose_mj.checks import Check
+
+    _check(args)
+    begun = time.perf_counter()
+    outcomes = _run_all(args)
+    rows = summarize(outcomes, args.exchange)
+    ahead = rows[args.episodes]["reached"] - rows[-len(args.exchange)]["reached"]
+    checks = [
+        Check("transferred vetoes that were lost", sum(o.vetoes_lost for o in outcomes), 0, "=="),
+        Check("goals after transfer, less the first control's", ahead, 0, ">="),
+    ]
+    if args.json:
+        results = {"summary": rows, "outcomes": [asdict(outcome) for outcome in outcomes]}
+        print_document(make_document("transfer", args, checks=checks, results=results))
+    else:
+        _print(args, outcomes, rows)
+        print_checks(checks)
+    passed = sum(check.ok for check in checks)
+    seconds = time.perf_counter() - begun
+    stream = sys.stderr if args.json else sys.stdout
+    print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
+    return 0 if passed == len(checks) else 1
+
+
+def _check(args: Args) -> None:
+    for name, least in (("moves", 1), ("episodes", 1), ("configurations", 1), ("seed", 0)):
+        if getattr(args, name) < least:
+            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    if not args.exchange or min(args.exchange) <= 0.0:
+        raise InputError("exchange", args.exchange, "numbers above 0, at least one")
+
+
+def _run_all(args: Args) -> list[Outcome]:
+    """Runs one configuration after the other, each with a generator of its own."""
+    import numpy as np
+    from hose_learning.transfer.trial import Plan, run_trial
+
+    from hose_mj.cli.progress import show_progress
+    from hose_mj.jit import compile_notice
+
+    plan = Plan(
+        source=args.source,
+        target=args.target,
+        source_options=parse_options(args.source_set),
+        target_options=parse_options(args.target_set),
+        moves=args.moves,
+        episodes=args.episodes,
+        exchange=args.exchange,
+        values=args.values,
+    )
+    with compile_notice("learner's kernels"):  # a short trial has everything compiled
+        run_trial(replace(plan, moves=1), np.random.default_rng(0))
+    outcomes = []
+    with show_progress("configurations", args.configurations) as advance:
+        for generator in np.random.default_rng(args.seed).spawn(args.configurations):
+            outcomes.append(run_trial(plan, generator))
+            advance(1)
+    return outcomes
+
+
+def summarize(outcomes: list[Outcome], exchange: tuple[float, ...]) -> list[dict[str, Any]]:
+    """Counts the configurations whose goal was reached, in all ways there are, with intervals.
+
+    One row for each greedy episode (the goal was reached in it for the first time), one for any of
+    them, one for the greedy policy on the source, one for each control.
+    """
+    from hose_learning.study.statistics import compute_rate_interval
+
+    def first(outcome: Outcome) -> int | None:
+        return outcome.reached.index(True) if any(outcome.reached) else None
+
+    n_episodes = max(len(outcome.reached) for outcome in outcomes)
+    found: list[tuple[str, list[bool]]] = [
+        (f"after transfer, first in episode {k + 1}", [first(o) == k for o in outcomes])
+        for k in range(n_episodes)
+    ]
+    found.append(("after transfer, in any of them", [any(o.reached) for o in outcomes]))
+    found.append(("greedy on the source", [o.source_reached for o in outcomes]))
+    for k, rate in enumerate(exchange):
+        name = f"exploring, at rate {rate:,.6g}"
+        found.append((name, [o.controls[k][1] for o in outcomes]))
+    return [
+        {
+            "what": name,
+            "reached": sum(which),
+            "of": len(which),
+            "interval": compute_rate_interval(sum(which), len(which)),
+        }
+        for name, which in found
+    ]
+
+
+def _print(args: Args, outcomes: list[Outcome], rows: list[dict[str, Any]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{args.source} to {args.target}: {', '.join(outcomes[0].modules)}")
+    table.add_column("goal reached")
+    table.add_column("configurations", justify="right")
+    table.add_column("95 % interval", justify="right")
+    for row in rows:
+        low, high = (100 * bound for bound in row["interval"])
+        share = f"{row['reached']} of {row['of']}"
+        table.add_row(row["what"], share, f"{low:.0f} to {high:.0f} %")
+    Console().print(table)
+    new = sum(o.vetoes_after - o.vetoes_before for o in outcomes)
+    kept = sum(o.vetoes_before for o in outcomes)
+    print(f"vetoes: {kept:,} transferred, {new:,} added on the target")

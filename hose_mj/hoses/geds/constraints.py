@@ -1,0 +1,472 @@
+"""`HoldSet`: the clamps and attachments of a hose, as rows of G x = g (thesis A.3).
+
+An attachment is d rows, r(s) = position. A clamp has d - 1 more, r'(s) . e = 0 for unit vectors e
+across the wanted tangent: the hose may stretch through it, but not turn. The rows' multipliers are
+the forces that a hold does to the hose, in space and on r'. In space a clamp also holds the angle
+of the material about the tangent: by a row for theta where there is one, else by the twist of the
+stretch to the next clamp (stretches.py). What joins the ends of a closed loop stands behind all of
+them (loops.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import loops
+from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds.frames import lay_frames
+from hose_mj.hoses.geds.span import make_span
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.twist import Twist, find_owners
+from hose_mj.hoses.inputs import check_vector
+from hose_mj.hoses.protocol import Array, Hold, Reaction
+from hose_mj.hoses.spec import check_number
+from hose_mj.jit import run_kernel
+
+_REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "kept")
+"""What of the twist goes into a snapshot."""
+_FIRST_END, _LAST_END = -1, -2
+"""Numbers of the clamps at s = 0 and s = L of a closed loop, which hold nothing (twist.py)."""
+
+
+@dataclass
+class _Held:
+    """One hold: where it is wanted at the end of the next step, and its multipliers."""
+
+    hold: Hold
+    position: Array  # (3,)
+    tangent: Array | None  # (3,), unit
+    multipliers: Array  # (d,) or (2 d - 1,), one more with theta
+    first: int = 0  # its first row of G x = g
+
+
+class HoldSet:
+    """All holds of one hose.
+
+    Args:
+        spline: the hose's geometry.
+        hose: its constants.
+
+    Attributes:
+        rows: what the kernels read and write; made anew by every change.
+        is_closed: whether the hose is a closed loop.
+    """
+
+    def __init__(self, spline: Spline, hose: solver.Hose) -> None:
+        self._spline, self._hose = spline, hose
+        self.is_closed = False
+        self._held: list[_Held] = []
+        self._giving: list[Hold] = []
+        self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
+        self._n_made = 0
+        x = np.zeros(spline.size)
+        self.rows = self._make_rows_of_all(x, stretches.make_twist(spline, hose, [], x))
+
+    @property
+    def n_rows(self) -> int:
+        """Rows of G, and of the twist between clamps."""
+        return len(self.rows.start) + len(self.rows.twist.angle)
+
+    @property
+    def is_free(self) -> bool:
+        """True where nothing holds the hose in space."""
+        return not self._held
+
+    def list_all(self) -> list[Hold]:
+        """All holds, the oldest first."""
+        return [held.hold for held in self._held]
+
+    def clear(self, x: Array, director: Array | None = None) -> None:
+        """Drops all holds and opens a loop; numbers are not used again. The frames begin anew.
+
+        Args:
+            x: the unknowns.
+            director: of the material where the hose begins, (3,); any by default.
+        """
+        self._held, self._clamps, self.is_closed = [], [], False
+        twist = stretches.make_twist(self._spline, self._hose, [], x)
+        if self._spline.has_theta:
+            start = stretches.make_directors(self._spline, np.zeros(1), x)[0]
+            twist.frames[0, 6:9] = start[3:] if director is None else director
+            axes, tables = self._spline.axes, self._hose.tables
+            run_kernel(lay_frames, axes, tables, twist, x, make_span(), twist.frames)
+            twist.kept[:] = twist.frames
+        self.rows = self._make_rows_of_all(x, twist)
+
+    def add(
+        self, arc_length: float, position: ArrayLike | None, tangent: Array | None, x: Array
+    ) -> Hold:
+        """Adds a hold.
+
+        Args:
+            arc_length: where on the hose (m).
+            position: wanted place (3,) m; None for where the hose is now.
+            tangent: wanted unit tangent (3,) of a clamp; None for an attachment.
+            x: the hose's unknowns.
+
+        Raises:
+            InputError: a place off the hose or that another hold is at, a position off its plane, a
+                tangent more than 90 degrees from where the hose points.
+        """
+        spline = self._spline
+        s = spline.check_place(arc_length)
+        for held in self._held:
+            apart = abs(held.hold.arc_length - s)
+            if self.is_closed:
+                apart = min(apart, spline.length - apart)
+            if apart < 1e-9 * spline.length:
+                raise InputError("arc_length", s, "a place that no other hold is at")
+        if position is None:
+            point = spline.evaluate(np.array([s]), x)[0] + spline.offset
+        else:
+            point = spline.check_position(position)
+        if tangent is not None:
+            _check_ahead(tangent, spline.evaluate(np.array([s]), x, 1)[0])
+        hold = Hold(self._n_made, s, tangent is not None)
+        n_rows = spline.dimension
+        if tangent is not None:
+            n_rows += spline.dimension - 1 + spline.has_theta
+        self._n_made += 1
+        self._held.append(_Held(hold, point, tangent, np.zeros(n_rows)))
+        self._rebuild(x)
+        return hold
+
+    def move(
+        self,
+        hold: Hold,
+        position: ArrayLike | None,
+        tangent: ArrayLike | None,
+        spin: float,
+        x: Array,
+    ) -> None:
+        """Sets where a hold is to be at the end of the next step; see `HoseModel.move`.
+
+        Raises:
+            InputError: a hold that is not here, a vector out of the plane, a tangent or a spin for
+                an attachment, a spin in a plane, a tangent turned by more than 90 degrees at once;
+                nothing has changed then.
+        """
+        held = self._find(hold)
+        check_number("spin", spin, may_be_negative=True)
+        if spin != 0.0 and (held.tangent is None or self._spline.dimension == 2):
+            raise InputError("spin", spin, "0 for an attachment and for a hose in a plane")
+        if tangent is not None and held.tangent is None:
+            raise InputError("tangent", tangent, "None for an attachment (use clamp)")
+        point = held.position if position is None else self._spline.check_position(position)
+        aim = held.tangent if tangent is None else self._spline.check_direction(tangent)
+        if aim is not None and held.tangent is not None:
+            _check_ahead(aim, held.tangent)
+        held.position, held.tangent = point, aim
+        if tangent is None:
+            self._aim(held, x)
+        else:
+            self._rebuild(x)
+        if spin != 0.0:
+            self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
+
+    def check_director(self, director: ArrayLike, tangent: Array) -> Array:
+        """Returns the part of a director (3,) across a unit tangent, as a unit vector.
+
+        Raises:
+            InputError: three numbers that are not, one along the tangent, any for a planar hose
+                or one whose theta has no frames.
+        """
+        vector = check_vector("director", director)
+        if self._spline.dimension == 2:
+            raise InputError("director", vector.tolist(), "None for a hose in a plane")
+        if self._hose.elasticity.frenet:
+            raise InputError("director", vector.tolist(), "None with twist='frenet'")
+        across = vector - (vector @ tangent) * tangent
+        length = float(np.linalg.norm(across))
+        if length < 1e-9 * float(np.linalg.norm(vector)) or length == 0.0:
+            raise InputError("director", vector.tolist(), "a vector across the tangent")
+        return np.asarray(across / length)
+
+    def turn_to(self, hold: Hold, director: Array, x: Array) -> None:
+        """Lets the material at a clamp turn to a director within the next step."""
+        held = self._find(hold)
+        clamp, twist = self._clamps.index(hold.number), self.rows.twist
+        assert held.tangent is not None
+        if self._spline.has_theta:
+            row = 3 * len(self._hose.tables.first) + clamp
+            theta = float(self._spline.evaluate_theta(np.array([hold.arc_length]), x)[0])
+            tangent, base = twist.kept[row, :3], twist.kept[row, 6:9]
+            now = np.cos(theta) * base + np.sin(theta) * np.cross(tangent, base)
+        else:
+            tangent, now = twist.directors[clamp, :3], twist.directors[clamp, 3:]
+        now = stretches.carry_director(tangent, held.tangent, now)
+        angle = float(np.arctan2(np.cross(now, director) @ held.tangent, now @ director))
+        if self._spline.has_theta or len(self._clamps) > 1:
+            twist.spin[clamp, 0] += angle
+        else:
+            # Nothing else knows the angle of a hose without theta.
+            stretches.turn_director(twist, clamp, angle)
+
+    def give_way(
+        self,
+        holds: Sequence[Hold],
+        positions: ArrayLike | None = None,
+        compliance: ArrayLike | None = None,
+    ) -> np.ndarray:
+        """Lets attachments yield to the hose within the next step, see `Carried.try_step`.
+
+        Returns:
+            the first row of each, (k,). Without positions that is all it does.
+
+        Raises:
+            InputError: a clamp, a hold that is not here, wrong shapes, numbers that are not finite.
+        """
+        if list(holds) != self._giving:
+            for hold in holds:
+                if self._find(hold).tangent is not None:
+                    raise InputError("hold", hold, "an attachment: a clamp on a body gives no way")
+            self._giving = list(holds)
+            self._giving_first = np.array([self._find(h).first for h in holds], dtype=np.int64)
+            d = self._spline.dimension
+            self._giving_rows = (self._giving_first[:, None] + np.arange(d)).ravel()
+            self.rows = self.rows._replace(response=solver.make_response(len(self.rows.start)))
+        if positions is not None:
+            k, dims = len(holds), self._spline.dims
+            places, matrix = np.asarray(positions, float), np.asarray(compliance, float)
+            if places.shape != (k, 3) or matrix.shape != (3 * k, 3 * k):
+                valid = f"({k}, 3) and ({3 * k}, {3 * k})"
+                shapes = (places.shape, matrix.shape)
+                raise InputError("shapes of positions and compliance", shapes, valid)
+            if not (np.isfinite(places).all() and np.isfinite(matrix).all()):
+                raise InputError("positions and compliance", places.tolist(), "finite numbers")
+            kept = (3 * np.arange(k)[:, None] + dims).ravel()
+            rows = self._giving_rows
+            self.rows.after[rows] = (places - self._spline.offset)[:, dims].ravel()
+            self.rows.response.compliance[rows[:, None], rows] = matrix[kept[:, None], kept]
+        return self._giving_first
+
+    def find_mean_forces(self) -> Array:
+        """Mean forces over the last step of the holds that give way, (k, 3), N, world frame."""
+        forces = np.zeros((len(self._giving), 3))
+        if not self._giving:
+            return forces
+        found = self.rows.response.force[self._giving_rows]
+        forces[:, self._spline.dims] = found.reshape(len(forces), -1)
+        return forces
+
+    def find_positions(self, x: Array) -> Array:
+        """Where unknowns x put the holds that give way, (k, 3), m, world frame."""
+        places = np.array([hold.arc_length for hold in self._giving])
+        return self._spline.evaluate(places, x) + self._spline.offset
+
+    def release(self, hold: Hold, x: Array) -> None:
+        """Drops one hold; raises `InputError` for one that is not here."""
+        self._held.remove(self._find(hold))
+        self._rebuild(x)
+
+    def close(self, spin: float, x: Array) -> None:
+        """Joins s = L to s = 0, its material turned by `spin` (rad) about the tangent before.
+
+        Raises:
+            InputError: a hose that is closed, held at both ends or whose ends do not meet; a spin
+                in a plane.
+        """
+        check_number("spin", spin, may_be_negative=True)
+        if spin != 0.0 and self._spline.dimension == 2:
+            raise InputError("spin", spin, "0 for a hose in a plane")
+        loops.check_open(self.is_closed)
+        loops.check_ends(self._spline, [one.hold.arc_length for one in self._held], x)
+        self.is_closed = True
+        self._rebuild(x, spin)
+
+    def open(self, x: Array) -> None:
+        """Parts the ends of a closed loop; raises `InputError` for a hose that is open."""
+        if not self.is_closed:
+            raise InputError("open()", "an open hose", "a hose that was closed")
+        self.is_closed = False
+        self._rebuild(x)
+
+    def reaction(self, hold: Hold, x: Array) -> Reaction:
+        """Force and moment of a hold on the hose at the end of the last step, world frame."""
+        held = self._find(hold)
+        d = self._spline.dimension
+        force = np.zeros(3)
+        force[self._spline.dims] = held.multipliers[:d]
+        moment = np.zeros(3)
+        if held.tangent is not None:
+            # A force f on r' works like the moment r' x f.
+            slope = self._spline.evaluate(np.array([hold.arc_length]), x, 1)[0]
+            across = held.multipliers[d : 2 * d - 1] @ self._across(held.tangent)
+            moment = np.cross(slope, across) + self._compute_torque(held) * held.tangent
+        return Reaction(force, moment)
+
+    def _compute_torque(self, held: _Held) -> float:
+        """Moment of a clamp on the hose about the tangent."""
+        if self._spline.dimension == 2:
+            return 0.0
+        if self._spline.has_theta:
+            return float(held.multipliers[-1])
+        twist, clamp = self.rows.twist, self._clamps.index(held.hold.number)
+        torque = twist.torque[find_owners(twist)]
+        arriving = float(torque[twist.ends[:, 1] == clamp].sum())
+        return arriving - float(torque[twist.ends[:, 0] == clamp].sum())
+
+    # -- state ---------------------------------------------------------------------------------
+
+    def snapshot(self) -> dict[str, Any]:
+        """All of it as arrays, plain numbers and containers of them."""
+        held = [
+            {
+                "number": one.hold.number,
+                "arc_length": one.hold.arc_length,
+                "position": one.position.copy(),
+                "tangent": None if one.tangent is None else one.tangent.copy(),
+                "multipliers": one.multipliers.copy(),
+            }
+            for one in self._held
+        ]
+        twist = {name: getattr(self.rows.twist, name).copy() for name in _REMEMBERED}
+        before = self.rows.before.copy()
+        return {
+            "held": held,
+            "n_made": self._n_made,
+            "is_closed": self.is_closed,
+            "before": before,
+            "twist": twist,
+            "giving": [hold.number for hold in self._giving],
+            "mean_force": self.rows.response.force.copy(),
+        }
+
+    def restore(self, state: dict[str, Any], x: Array) -> None:
+        """Returns to a snapshot; x are the control points of the same moment."""
+        self._held = [
+            _Held(
+                Hold(one["number"], one["arc_length"], one["tangent"] is not None),
+                one["position"].copy(),
+                None if one["tangent"] is None else one["tangent"].copy(),
+                one["multipliers"].copy(),
+            )
+            for one in state["held"]
+        ]
+        self._n_made = max(self._n_made, state["n_made"])
+        self.is_closed = state["is_closed"]
+        self._rebuild(x)
+        self.rows.before[:] = state["before"]
+        for name in _REMEMBERED:
+            getattr(self.rows.twist, name)[:] = state["twist"][name]
+        self.rows.twist.frames[:] = self.rows.twist.kept
+        if state["giving"]:
+            numbers = {one.hold.number: one.hold for one in self._held}
+            self.give_way([numbers[number] for number in state["giving"]])
+            self.rows.response.force[:] = state["mean_force"]
+
+    # -- inside --------------------------------------------------------------------------------
+
+    def _find(self, hold: Hold) -> _Held:
+        for held in self._held:
+            if held.hold == hold:
+                return held
+        raise InputError("hold", hold, "a hold of this hose that was not released")
+
+    def _across(self, tangent: Array) -> Array:
+        """Unit vectors of the hose's space that are normal to a tangent, (d - 1, 3)."""
+        if self._spline.dimension == 2:
+            return np.cross(self._spline.normal, tangent)[None]
+        first = stretches.find_normal(tangent)
+        return np.stack([first, np.cross(tangent, first)])
+
+    def _rebuild(self, x: Array, spin: float = 0.0) -> None:
+        """Makes everything anew from the list of holds; the material stays as it lies.
+
+        `spin`: what the last end of a loop is turned by (rad).
+        """
+        held = sorted(
+            (one for one in self._held if one.tangent is not None),
+            key=lambda one: one.hold.arc_length,
+        )
+        numbers = [one.hold.number for one in held]
+        places = [one.hold.arc_length for one in held]
+        if self.is_closed:
+            numbers = [_FIRST_END, *numbers, _LAST_END]
+            places = [0.0, *places, self._spline.length]
+        if self._spline.dimension == 2 or numbers == self._clamps:
+            self.rows = self._make_rows_of_all(x, self.rows.twist)
+            return
+        same = {k: self._clamps.index(n) for k, n in enumerate(numbers) if n in self._clamps}
+        twist = stretches.make_twist(self._spline, self._hose, places, x)
+        if self._spline.has_theta:
+            n_spans = len(self._hose.tables.first)
+            stretches.take_over_frames(twist, self.rows.twist, same, n_spans)
+        else:
+            old = stretches.part_ends(self._spline, self._hose, self.rows.twist, x)
+            stretches.take_over_twist(self._spline, self._hose, twist, old, same, x)
+            if self.is_closed:
+                twist = stretches.join_ends(twist, spin)
+            stretches.settle(twist)
+        self._clamps = numbers
+        self.rows = self._make_rows_of_all(x, twist)
+
+    def _make_rows_of_all(self, x: Array, twist: Twist) -> solver.Holds:
+        """Makes the rows of G x = g: positions first, then slopes across, then theta.
+
+        `before` is what x meets now, so a hold that was moved goes its way within the next step
+        and not before it begins.
+        """
+        d, width = self._spline.dimension, 4 * self._spline.stride
+        m = sum(len(held.multipliers) for held in self._held) + 2 * d * self.is_closed
+        start = np.zeros(m, dtype=np.int64)
+        coefficients = np.zeros((m, width * (1 + self.is_closed)))
+        before, after, multipliers = np.zeros((3, m))
+        first = 0
+        for held in self._held:
+            own = slice(first, first + len(held.multipliers))
+            places, values = self._spline.compute_basis(np.array([held.hold.arc_length]))
+            start[own] = places[0]
+            coefficients[own, :width] = self._make_rows(held, values[0])
+            before[own] = coefficients[own, :width] @ x[places[0] : places[0] + width]
+            after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
+            if held.tangent is not None and self._spline.has_theta:
+                after[own.stop - 1] = before[own.stop - 1]
+                twist.turn_rows[self._clamps.index(held.hold.number)] = own.stop - 1
+            multipliers[own] = held.multipliers
+            # A view: what the kernels write belongs to the hold.
+            held.multipliers, held.first = multipliers[own], first
+            first = own.stop
+        if self.is_closed:
+            coefficients[first:] = loops.make_joint_rows(self._spline)
+            before[first:] = coefficients[first:, :width] @ x[:width]
+            before[first:] += coefficients[first:, width:] @ x[-width:]
+        self._giving = []
+        response = solver.make_response(0)
+        return solver.Holds(start, coefficients, before, after, multipliers, twist, response)
+
+    def _aim(self, held: _Held, x: Array) -> None:
+        """What `_rebuild` does for a hold of which only the position has changed."""
+        d, rows = self._spline.dimension, self.rows
+        own = slice(held.first, held.first + len(held.multipliers))
+        start, width = rows.start[held.first], 4 * self._spline.stride
+        rows.before[own] = rows.rows[own, :width] @ x[start : start + width]
+        wanted = (held.position - self._spline.offset)[self._spline.dims]
+        rows.after[held.first : held.first + d] = wanted
+
+    def _make_rows(self, held: _Held, values: Array) -> Array:
+        """Coefficients of one hold's rows from the basis there (3, 4)."""
+        d, stride = self._spline.dimension, self._spline.stride
+        rows = np.zeros((len(held.multipliers), 4, stride))
+        for c in range(d):
+            rows[c, :, c] = values[0]
+        if held.tangent is not None:
+            for k, direction in enumerate(self._across(held.tangent)):
+                rows[d + k, :, :d] = np.outer(values[1], direction[self._spline.dims])
+            if self._spline.has_theta:
+                rows[-1, :, 3] = values[0]
+        return rows.reshape(len(rows), 4 * stride)
+
+
+def _check_ahead(aim: Array, now: Array) -> None:
+    """Raises `InputError` for a tangent (3,) that points back: r' . e = 0 cannot tell its sign."""
+    if aim @ now < 0.0:
+        valid = "a direction within 90 degrees of the hose's there; turn a clamp further in steps"
+        raise InputError("tangent", aim.tolist(), valid)

@@ -1,0 +1,393 @@
+"""`GedsHose`: the spline hose behind the HoseModel protocol; a thin class over the kernels.
+
+spline.py knows where the hose is in the world, body.py its state, holds.py and loads.py what acts
+on it, mechanics.py how the kernels are called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError, StepError
+from hose_mj.hoses.geds import integrators as schemes
+from hose_mj.hoses.geds import mechanics, statics
+from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.geds.body import SplineBody
+from hose_mj.hoses.geds.body_coupling import Carried
+from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.loads import LoadSet
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.touching import Touching
+from hose_mj.hoses.inputs import check_count, check_vector
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+from hose_mj.hoses.protocol import Array, Curve, Hold, Linearization, Reaction
+from hose_mj.hoses.spec import HoseSpec, check_number
+from hose_mj.jit import run_kernel
+
+_TURN_TOLERANCE = 2e-3
+"""What a change of theta (rad) may be when Newton's iteration stops."""
+
+
+class GedsHose(Carried, Touching, SplineBody):
+    """Geometrically Exact Dynamic Splines (thesis appendix A) with an implicit integrator.
+
+    Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact
+    forces those of `Touching`, steps with bodies that feel the hose those of `Carried`.
+
+    Args:
+        spec: the hose.
+        timestep: length of a step (s).
+        gravity: (3,) m/s^2.
+        control_points: n; the cost of a step is linear in it.
+        plane: None for space; "xy", "xz" or "yz" for a hose that stays in that plane, at a fraction
+            of the cost.
+        twist: "scalar" for one angle between two clamps, "theta" for an angle at every control
+            point; None for what the spec needs: theta in space where the hose is curved at rest or
+            bends unequally. "frenet" is the literal strain of GEDS, to reproduce how it fails
+            (docs/frenet.md): theta is then the angle from the Frenet normal, a clamp holds that
+            angle, and a hose is laid with theta = 0, that is twisted by the torsion of its curve.
+        scheme: "bdf2" (default), "backward-euler", "sdirk2", "midpoint" or "verlet".
+        tolerance: Newton goes on while it moves a control point by more than this fraction of L;
+            with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
+        max_iterations: Newton iterations in a stage before the careful fallback.
+        obstacles: what the hose may touch; `set_obstacles` changes it.
+        contact_law: numbers of the contact; None for the defaults.
+
+    Attributes:
+        spec, gravity, scheme: as given.
+        fallbacks: how often a solve needed the Gauss-Newton matrix or the careful iteration.
+        iterations: Newton iterations so far.
+
+    Raises:
+        InputError: a value outside its valid set, named.
+    """
+
+    def __init__(
+        self,
+        spec: HoseSpec,
+        *,
+        timestep: float = 0.005,
+        gravity: ArrayLike = (0.0, 0.0, -9.81),
+        control_points: int = 16,
+        plane: str | None = None,
+        twist: str | None = None,
+        scheme: str = "bdf2",
+        tolerance: float = 2e-4,
+        max_iterations: int = 20,
+        obstacles: Sequence[Obstacle] = (),
+        contact_law: ContactLaw | None = None,
+    ) -> None:
+        check_number("timestep", timestep)
+        check_number("tolerance", tolerance)
+        check_count("max_iterations", max_iterations, 1)
+        has_theta = mechanics.check_twist(twist, spec, plane)
+        mechanics.check_scheme(scheme, spec, has_theta)
+        spline = Spline(control_points, spec.length, plane, has_theta)
+        super().__init__(spec, spline, gravity, twist == "frenet")
+        self.scheme = scheme
+        self.fallbacks = self.iterations = self._steps = 0
+        self._timestep = float(timestep)
+        move = tolerance * spec.length
+        self._limits = solver.Limits(
+            move, move / _TURN_TOLERANCE, max_iterations, np.inf, False, 0.0
+        )
+        self._contacts = ContactSet(self._spline, spec, self.gravity, self._timestep)
+        self._loads = LoadSet(self._spline, self._weight, self._contacts.contact)
+        if len(obstacles) > 0:
+            self.set_obstacles(obstacles, contact_law)
+        self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
+
+    # -- state -----------------------------------------------------------------------------------
+
+    @property
+    def timestep(self) -> float:
+        """Length of one step (s)."""
+        return self._timestep
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the last reset (s)."""
+        return self._steps * self._timestep
+
+    @property
+    def control_points(self) -> Array:
+        """Control points of the spline now, (n, 3), m."""
+        return self._spline.to_world(self._state.x) + self._spline.offset
+
+    def reset(
+        self, curve: Curve, velocity: Curve | None = None, director: ArrayLike | None = None
+    ) -> None:
+        """Lays the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
+
+        The material is laid free of torque, but for twist="frenet" (docs/frenet.md). A closed loop
+        is open again.
+
+        Args:
+            curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.
+            velocity: m/s, world frame: (3,), or rows (k, 3) spread evenly over the arc length, or a
+                function of arc lengths (k,) that returns (k, 3); None for rest.
+            director: m1 where the hose begins, (3,), its part along the tangent ignored; only a
+                hose with theta reads it. None for any.
+
+        Raises:
+            InputError: a curve or a velocity that is not finite, has a wrong shape or leaves the
+                plane of a planar hose; a curve far from the hose's length. Nothing changed then.
+        """
+        start = None if director is None else check_vector("director", director)
+        self._lay(curve, velocity)
+        self._start(start)
+
+    def set_control_points(self, points: ArrayLike) -> None:
+        """Puts the control points at (n, 3) m, at rest, however odd; drops holds and loads.
+
+        Meant for tests of odd states; `reset` is for use. A planar hose takes its plane from the
+        first point.
+
+        Raises:
+            InputError: a wrong shape, a number that is not finite, points out of the plane.
+        """
+        self._put(points)
+        self._start()
+
+    def snapshot(self) -> dict[str, Any]:
+        """All that `restore` needs to continue bit by bit: arrays, numbers, containers of them."""
+        return {
+            "state": {name: part.copy() for name, part in self._state._asdict().items()},
+            "offset": self._spline.offset.copy(),
+            "steps": self._steps,
+            "holds": self._holds.snapshot(),
+            "loads": self._loads.snapshot(),
+            "contacts": self._contacts.snapshot(),
+            "iterations": self.iterations,
+            "fallbacks": self.fallbacks,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot of this hose, or of one with as many control points and unknowns.
+
+        Raises:
+            InputError: a snapshot of a hose with another number of unknowns.
+        """
+        size = len(state["state"]["x"])
+        if size != self._spline.size:
+            valid = f"{self._spline.size}, as in this hose"
+            raise InputError("number of unknowns in the snapshot", size, valid)
+        self._state = schemes.State(**{name: part.copy() for name, part in state["state"].items()})
+        self._spline.offset = state["offset"].copy()
+        self._steps = state["steps"]
+        self.iterations, self.fallbacks = state["iterations"], state["fallbacks"]
+        self._loads.restore(state["loads"])
+        self._holds.restore(state["holds"], self._state.x)
+        self._contacts.restore(state["contacts"])
+        self._contacts.set_closed(self.is_closed)
+        self._loads.set_contact(self._contacts.contact)
+        self._renew_work()
+
+    # -- holds and loads ---------------------------------------------------------------------------
+
+    def clamp(
+        self,
+        arc_length: float,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+        director: ArrayLike | None = None,
+    ) -> Hold:
+        """Holds a point, the tangent and the material's angle there; by default where they are now.
+
+        Position (3,) m, tangent (3,) and director (3,), of any length above 0, are in the world
+        frame; the director is where m1 is to point, its part along the tangent ignored, reached by
+        a turn of less than half. Raises `InputError` for a place off the hose or taken, and for
+        vectors out of a planar hose's plane.
+        """
+        place = self._spline.check_place(arc_length)
+        aim = self._spline.check_direction(self.tangent(place)[0] if tangent is None else tangent)
+        across = None if director is None else self._holds.check_director(director, aim)
+        hold = self._holds.add(arc_length, position, aim, self._state.x)
+        if across is not None:
+            self._holds.turn_to(hold, across, self._state.x)
+        self._renew_work()
+        return hold
+
+    def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
+        """Holds a point and leaves the tangent free; by default where it is now. See `clamp`."""
+        hold = self._holds.add(arc_length, position, None, self._state.x)
+        self._renew_work()
+        return hold
+
+    def move(
+        self,
+        hold: Hold,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+        spin: float = 0.0,
+    ) -> None:
+        """Sets where a hold is to be at the end of the next step: position (3,) m, tangent (3,).
+
+        A clamp's material goes along by the smallest rotation to the new tangent and is turned by
+        `spin` (rad, right-handed about the tangent, any number of turns) on top. Raises
+        `InputError` for a hold that was released, a tangent or a spin for an attachment, vectors
+        out of a planar hose's plane.
+        """
+        self._holds.move(hold, position, tangent, spin, self._state.x)
+
+    @property
+    def holds(self) -> list[Hold]:
+        """All clamps and attachments, the oldest first."""
+        return self._holds.list_all()
+
+    def release(self, hold: Hold) -> None:
+        """Lets go; raises `InputError` for a hold that was released before."""
+        self._holds.release(hold, self._state.x)
+        self._renew_work()
+
+    def reaction(self, hold: Hold) -> Reaction:
+        """Force (N) and moment (N m) of a hold on the hose at the end of the last step.
+
+        Both in the world frame. Raises `InputError` for a hold that was released.
+        """
+        return self._holds.reaction(hold, self._state.x)
+
+    def close(self, spin: float = 0.0) -> None:
+        """Joins the end of the hose to its beginning: an O-ring, a belt, a rubber band.
+
+        Place and r' go on across the joint from the end of the next step on, and so does the
+        material: its end is turned by `spin` (rad, right-handed about the tangent, any number of
+        turns) and then glued. Lay the hose along a closed curve first (`loops.make_circle`).
+        `open` and `reset` part the ends.
+
+        Raises:
+            InputError: a hose with theta, one that is closed or held at both ends, ends that do not
+                meet, a spin in a plane. Nothing changed then.
+        """
+        if self._spline.has_theta:
+            raise InputError("twist", "theta", "scalar for a hose that is to be closed")
+        self._holds.close(spin, self._state.x)
+        self._contacts.set_closed(True)
+        self._loads.set_contact(self._contacts.contact)
+        self._renew_work()
+
+    def open(self) -> None:
+        """Parts the ends that `close` has joined; raises `InputError` for an open hose."""
+        self._holds.open(self._state.x)
+        self._contacts.set_closed(False)
+        self._loads.set_contact(self._contacts.contact)
+        self._renew_work()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the ends are joined."""
+        return self._holds.is_closed
+
+    def apply_force(self, arc_length: float, force: ArrayLike) -> None:
+        """Adds a point force (3,) N that acts until `clear_loads` (thesis A.27)."""
+        self._loads.add_force(arc_length, force)
+
+    def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
+        """Adds a point moment (3,) N m until `clear_loads`; what lies along the tangent is lost."""
+        self._loads.add_moment(arc_length, moment)
+
+    def clear_loads(self) -> None:
+        """Drops all point forces and moments; gravity stays."""
+        self._loads.clear()
+
+    # -- motion ------------------------------------------------------------------------------------
+
+    def step(self, n_steps: int = 1) -> None:
+        """Advances the clock by n_steps steps.
+
+        Raises:
+            InputError: n_steps is not a whole number at or above 0.
+            StepError: a step that no fallback finished; the last step that worked is kept.
+        """
+        if check_count("n_steps", n_steps, 0) == 0:
+            return
+        counts = np.zeros(3, dtype=np.int64)
+        verdict = run_kernel(
+            *(schemes.advance, self._axes, self._hose, self._holds.rows, self._loads.loads),
+            *(self._limits, schemes.SCHEMES[self.scheme], self._timestep, int(n_steps)),
+            *(self._state, counts),
+        )
+        self._steps += int(counts[schemes.STEPS])
+        self.iterations += int(counts[schemes.ITERATIONS])
+        self.fallbacks += int(counts[schemes.FALLBACKS])
+        self._check(verdict)
+
+    def solve_static(self, load_steps: int = 1) -> None:
+        """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.
+
+        The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
+
+        Raises:
+            InputError: load_steps is not a whole number from 1 to 64; a closed loop that nothing
+                holds.
+            StepError: no equilibrium was found; the state before is kept.
+        """
+        check_count("load_steps", load_steps, 1, statics.MOST_LOAD_STEPS)
+        if self.is_closed and self._holds.is_free:
+            valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
+            raise InputError("holds of a closed loop", "none", valid)
+        found = statics.find_equilibrium(
+            *(self._axes, self._hose, self._holds.rows, self._loads.loads),
+            *(self._state.x, self._work, int(load_steps)),
+        )
+        self.iterations += found.iterations
+        self.fallbacks += found.fallbacks
+        if found.verdict != solver.DONE:
+            raise StepError(f"no static equilibrium was found: {solver.VERDICTS[found.verdict]}")
+        self._state = schemes.make_state(self._spline.size)
+        self._state.x[:] = found.x
+        statics.accept(self._axes, self._hose, self._holds.rows, self._state, self._work)
+
+    def linearize(self) -> Linearization:
+        """Mass, tangent stiffness and hold rows in the control points' n d coordinates."""
+        self._build_tangent()
+        rows, size = self._holds.rows, self._spline.size
+        return mechanics.compute_linearization(self._axes, self._hose, rows, self._work, size)
+
+    def compute_required_forces(self, acceleration: ArrayLike) -> Array:
+        """Forces on the control points for wanted accelerations of theirs (inverse dynamics).
+
+        Thesis A.25 with the sign of its P derived from the energy: F_p = M A + dU/dp + C v - F_e.
+
+        Args:
+            acceleration: of the control points, (n, 3), m/s^2.
+
+        Returns:
+            (n, 3) N; for robots at arc lengths s it is J_pr(s) F_r where that can be met exactly.
+
+        Raises:
+            InputError: a wrong shape or a number that is not finite.
+        """
+        wanted = np.asarray(acceleration, dtype=np.float64)
+        n = self._spline.n_control_points
+        if wanted.shape != (n, 3) or not np.all(np.isfinite(wanted)):
+            raise InputError("acceleration", wanted.shape, f"finite numbers, shape ({n}, 3)")
+        self._build_tangent()
+        drag = self._hose.drag_rate * self._state.v
+        inertia = self._multiply_mass(self._spline.from_world(wanted) + drag)
+        internal = self._work.gradient[: self._spline.size]
+        return self._spline.to_world(inertia + internal - self._loads.loads.force)
+
+    # -- inside ------------------------------------------------------------------------------------
+
+    def _start(self, director: Array | None = None) -> None:
+        self._steps = 0
+        self._contacts.set_closed(False)
+        self._loads.set_contact(self._contacts.contact)
+        self._loads.clear()
+        self._holds.clear(self._state.x, director)
+        self._renew_work()
+
+    def _renew_work(self) -> None:
+        n_points, stride = self._spline.n_control_points, self._spline.stride
+        self._work = solver.make_work(n_points, stride, self._holds.n_rows)
+
+    def _build_tangent(self) -> None:
+        mechanics.build_tangent(
+            *(self._axes, self._hose, self._holds.rows, self._loads.loads),
+            *(self._state.x, self._state.v, self._work),
+        )

@@ -1,0 +1,363 @@
+"""Time stepping: backward Euler, BDF2, SDIRK2, implicit midpoint over one stage solver, and Verlet.
+
+BDF2 is the default: second order, and it damps what the time step cannot resolve. The others are
+there for validation: SDIRK2 (no memory), the midpoint rule (conserves angular momentum, but gains
+energy in stiff axial modes over long runs) and Verlet (explicit, independent of Newton).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hose_mj.hoses.geds.band import factorize
+from hose_mj.hoses.geds.frames import accept_frames, restore_frames
+from hose_mj.hoses.geds.newton import (
+    DEPENDENT_HOLDS,
+    DONE,
+    NOT_FINITE,
+    Limits,
+    add_mass,
+    build,
+    make_work,
+    multiply_row,
+    newton,
+    solve_with_holds,
+)
+from hose_mj.hoses.geds.span import make_span
+from hose_mj.hoses.geds.twist import accept_twist, start_twist
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import choose_by_unknowns, compiled, inlined, kernel, merged
+
+SCHEMES = {"backward-euler": 0, "bdf2": 1, "sdirk2": 2, "midpoint": 3, "verlet": 4}
+_BACKWARD_EULER, _BDF2, _SDIRK2, _MIDPOINT, _VERLET = range(5)
+_GAMMA = 1.0 - np.sqrt(0.5)
+_NO_CHANGE = 1e200
+"""Softness that keeps the twist's rank-one terms out of the mass matrix."""
+
+
+class State(NamedTuple):
+    """What a hose remembers, flat arrays (n d,): all of it makes a snapshot.
+
+    Attributes:
+        x, v: control points (m) and their velocities (m/s).
+        x_old, v_old: the same one step earlier (BDF2).
+        a: acceleration at the end of the last step, for the predictor.
+        started: (1,), 1.0 once x_old and v_old hold a step.
+    """
+
+    x: Array
+    v: Array
+    x_old: Array
+    v_old: Array
+    a: Array
+    started: Array
+
+
+STEPS, ITERATIONS, FALLBACKS = range(3)
+"""Places in the counters, (3,): steps done, Newton iterations, solver fallbacks."""
+
+
+def make_state(size: int) -> State:
+    """Returns a state of `size` unknowns, all zero."""
+    x, v, x_old, v_old, a = (np.zeros(size) for _ in range(5))
+    return State(x, v, x_old, v_old, a, np.zeros(1))
+
+
+ATTEMPTS = 6
+"""The scheme as asked; backward Euler; the same with a line search in 1, 8, 64, 512 parts."""
+
+
+@inlined
+def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-def]
+    """Writes X, V and the guess x of a stage; returns its length h and where in the step it ends.
+
+    work.x_now and work.v_now hold the state at the beginning of the step (or part of a step).
+    """
+    size = len(state.x)
+    if scheme == _BDF2:
+        for k in range(size):
+            work.X[k] = (4.0 * work.x_now[k] - state.x_old[k]) / 3.0
+            work.V[k] = (4.0 * work.v_now[k] - state.v_old[k]) / 3.0
+            work.x[k] = work.x_now[k] + dt * (work.v_now[k] + 0.5 * dt * state.a[k])
+        return 2.0 * dt / 3.0, 1.0
+    if scheme == _SDIRK2 and stage == 1:
+        h = _GAMMA * dt
+        rest = dt - h
+        for k in range(size):
+            v = (work.x[k] - work.X[k]) / h
+            work.X[k] = work.x_now[k] + rest * v
+            work.V[k] = work.v_now[k] + rest * (v - work.v_now[k]) / h
+            work.x[k] += rest * v
+        return h, 1.0
+    fraction = 1.0
+    if scheme == _SDIRK2:
+        fraction = _GAMMA
+    elif scheme == _MIDPOINT:
+        fraction = 0.5
+    h = fraction * dt
+    for k in range(size):
+        work.X[k] = work.x_now[k]
+        work.V[k] = work.v_now[k]
+        work.x[k] = work.x_now[k] + h * (work.v_now[k] + 0.5 * h * state.a[k])
+    return h, fraction
+
+
+@inlined
+def _set_up_response(holds, scheme, stage, part, parts):  # type: ignore[no-untyped-def]
+    """Writes what a stage knows of the mean force over the step: base + share lambda.
+
+    BDF2's share carries on a third of the force before, so that its impulses are those that change
+    the hose's momentum. Where a step is taken in parts, each takes its force for that of the rest.
+    """
+    response = holds.response
+    share = 1.0
+    if scheme == _BDF2:
+        share = 2.0 / 3.0
+    elif scheme == _SDIRK2 and stage == 1:
+        share = _GAMMA
+    else:
+        share = (parts - part) / parts
+    response.share[0] = share
+    for row in range(len(response.compliance)):
+        if scheme == _BDF2:
+            base = response.force[row] / 3.0
+        elif scheme == _SDIRK2:
+            base = (1.0 - _GAMMA) * response.gathered[row]
+        else:
+            base = response.gathered[row] / parts
+        response.base[row] = base
+
+
+@merged
+def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, counts):  # type: ignore[no-untyped-def]
+    """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
+
+    Returns the verdict and the length of the last stage.
+    """
+    size = len(state.x)
+    for k in range(size):
+        work.x_now[k] = state.x[k]
+        work.v_now[k] = state.v[k]
+    n_stages = 2 if scheme == _SDIRK2 else 1
+    h = dt
+    response = holds.response
+    for row in range(len(response.compliance)):
+        response.gathered[row] = 0.0
+    for part in range(parts):
+        for stage in range(n_stages):
+            h, end = _set_up_stage(scheme, stage, dt / parts, state, work)
+            fraction = (part + end) / parts
+            _set_up_response(holds, scheme, stage, part, parts)
+            verdict, iterations, fallbacks = newton(
+                axes, hose, (h, work.X, work.V), holds, fraction, loads, 1.0, limits, work.x, work
+            )
+            counts[ITERATIONS] += iterations
+            counts[FALLBACKS] += fallbacks
+            if verdict != DONE:
+                return verdict, h
+            for row in range(len(response.compliance)):
+                response.gathered[row] += work.multipliers[row]
+        for k in range(size):
+            v = (work.x[k] - work.X[k]) / h
+            if scheme == _MIDPOINT:
+                work.x_now[k] = 2.0 * work.x[k] - work.X[k]
+                work.v_now[k] = 2.0 * v - work.V[k]
+            else:
+                work.x_now[k] = work.x[k]
+                work.v_now[k] = v
+    return DONE, h
+
+
+@inlined
+def _accept_scalar(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
+    accept_twist(axes, holds.twist, state.x)
+
+
+@inlined
+def _restore_scalar(axes, twist):  # type: ignore[no-untyped-def]
+    start_twist(twist)
+
+
+@inlined
+def _restore_frames(axes, twist):  # type: ignore[no-untyped-def]
+    restore_frames(twist)
+
+
+_accept = choose_by_unknowns({3: _accept_scalar, 4: accept_frames})
+_restore = choose_by_unknowns({3: _restore_scalar, 4: _restore_frames})
+
+
+@inlined
+def start_step(axes, holds, dt):  # type: ignore[no-untyped-def]
+    """Returns twist and frames to the last accepted state; sets the clamps' rates of spin."""
+    twist = holds.twist
+    for clamp in range(len(twist.starts)):
+        twist.spin[clamp, 1] = twist.spin[clamp, 0] / dt
+    _restore(axes, twist)
+
+
+@merged
+def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
+    """One step; where its Newton fails, backward Euler, in the end in ever finer parts."""
+    careful = Limits(
+        limits.tolerance, limits.turn_length, 3 * limits.max_iterations, np.inf, True, 0.0
+    )
+    verdict = NOT_FINITE
+    for attempt in range(ATTEMPTS):
+        first = attempt == 0
+        if first and scheme == _BDF2 and state.started[0] == 0.0:
+            use = _BACKWARD_EULER
+        else:
+            use = scheme if first else _BACKWARD_EULER
+        parts = 1 if attempt < 3 else 8 ** (attempt - 2)
+        start_step(axes, holds, dt)
+        verdict, h = _try_step(
+            axes,
+            hose,
+            holds,
+            loads,
+            limits if attempt < 2 else careful,
+            use,
+            dt,
+            parts,
+            state,
+            work,
+            counts,
+        )
+        if verdict == DEPENDENT_HOLDS:
+            return verdict
+        if verdict == DONE:
+            for k in range(len(state.x)):
+                state.x_old[k] = state.x[k]
+                state.v_old[k] = state.v[k]
+                state.a[k] = ((work.x[k] - work.X[k]) / h - work.V[k]) / h
+                state.x[k] = work.x_now[k]
+                state.v[k] = work.v_now[k]
+            state.started[0] = 1.0 if first else 0.0
+            return verdict
+        counts[FALLBACKS] += 1
+    return verdict
+
+
+@merged
+def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-untyped-def]
+    """Velocity Verlet with holds on positions and velocities (RATTLE); no damping, no drag."""
+    width = 4 * len(axes)
+    size = len(state.x)
+    start_step(axes, holds, dt)
+    for k in range(size):
+        work.X[k] = state.x[k]
+        work.V[k] = state.v[k]
+    for half in range(2):
+        # First half: lambda such that x_(n+1) meets the holds. Second: such that v_(n+1) does.
+        for row in range(len(holds.start)):
+            speed = multiply_row(axes, holds, row, work.V, size)
+            if half == 0:
+                gap = holds.after[row] - multiply_row(axes, holds, row, work.X, size)
+                work.shift[row] = 2.0 * (gap - dt * speed) / (dt * dt)
+            else:
+                wanted = (holds.after[row] - holds.before[row]) / dt
+                work.shift[row] = 2.0 * (wanted - speed) / dt
+        # A stage of infinite length has no inertia: what it builds is the force.
+        infinite = (np.inf, work.X, work.V)
+        build(axes, hose, infinite, holds.twist, 1.0, loads, 1.0, True, work.X, work)
+        for k in range(size):
+            for m in range(width):
+                work.band[k, m] = 0.0
+        add_mass(axes, hose, 1.0, work.band)
+        factorize(axes, size, work.band)
+        verdict = solve_with_holds(axes, holds, 0.0, _NO_CHANGE, 0, size, work)
+        if verdict != DONE:
+            return verdict
+        for k in range(size):
+            work.V[k] += 0.5 * dt * work.gradient[k]
+            if half == 0:
+                work.X[k] += dt * work.V[k]
+            if not np.isfinite(work.X[k] + work.V[k]):
+                return NOT_FINITE
+    for k in range(size):
+        state.x_old[k] = state.x[k]
+        state.v_old[k] = state.v[k]
+        state.a[k] = work.gradient[k]
+        state.x[k] = work.X[k]
+        state.v[k] = work.V[k]
+    state.started[0] = 1.0
+    return DONE
+
+
+@kernel
+def take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
+    """Takes one step, but for what `end_step` does; returns a verdict.
+
+    It allocates nothing, so numba counts no references to the arrays in its records: to count them
+    would cost a short hose nearly as much as the step itself.
+    """
+    if scheme == _VERLET:
+        verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
+    else:
+        verdict = _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+    if verdict == DONE:
+        counts[STEPS] += 1
+        for row in range(len(holds.start)):
+            holds.multipliers[row] = work.multipliers[row]
+        response = holds.response
+        for row in range(len(response.compliance)):
+            force = response.base[row] + response.share[0] * work.multipliers[row]
+            response.force[row] = force
+    return verdict
+
+
+@merged
+def end_step(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
+    """Accepts a step: the holds are where they have come to, twist and frames what was found."""
+    response = holds.response
+    for row in range(len(holds.start)):
+        holds.before[row] = holds.after[row]
+        for other in range(len(response.compliance)):
+            holds.before[row] -= response.compliance[row, other] * response.force[other]
+    _accept(axes, hose, holds, state, p)
+
+
+@compiled
+def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts):  # type: ignore[no-untyped-def]
+    """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
+
+    A step that fails leaves the state at the step before it; `counts` says how many were done. Ten
+    arguments: it is the one entry to the dynamics. It makes its work arrays itself, which is
+    quicker than handing them over from Python.
+    """
+    n_rows = len(holds.start) + len(holds.twist.angle)
+    work = make_work(hose.mass.shape[0], len(axes), n_rows)
+    for _ in range(n_steps):
+        verdict = take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+        if verdict != DONE:
+            return verdict
+        end_step(axes, hose, holds, state, work.span)
+    return DONE
+
+
+@kernel
+def copy_state(source, target):  # type: ignore[no-untyped-def]
+    """Copies all of a state into another one."""
+    for k in range(len(source.x)):
+        target.x[k], target.v[k], target.a[k] = source.x[k], source.v[k], source.a[k]
+        target.x_old[k], target.v_old[k] = source.x_old[k], source.v_old[k]
+    target.started[0] = source.started[0]
+
+
+@compiled
+def try_step(axes, hose, holds, loads, limits, scheme, dt, state, trial, counts):  # type: ignore[no-untyped-def]
+    """Takes one step of a state into `trial`; returns a verdict. `keep_step` makes it count."""
+    n_rows = len(holds.start) + len(holds.twist.angle)
+    work = make_work(hose.mass.shape[0], len(axes), n_rows)
+    copy_state(state, trial)
+    return take_step(axes, hose, holds, loads, limits, scheme, dt, trial, work, counts)
+
+
+@compiled
+def keep_step(axes, hose, holds, trial, state):  # type: ignore[no-untyped-def]
+    """Makes a step of `try_step` count."""
+    copy_state(trial, state)
+    end_step(axes, hose, holds, state, make_span())

@@ -1,0 +1,252 @@
+"""The clamps of a hose and the stretches between them, as the kernels of twist.py read them.
+
+Made anew whenever a clamp comes or goes. The material stays where it is: a clamp that comes takes
+hold of it as it lies, and one that goes leaves its neighbours with the twist that was between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.geds.span import make_span
+from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.geds.twist import Twist, find_owners, measure_twist
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import run_kernel
+
+_NODES = np.polynomial.legendre.leggauss(3)[0]
+_LAGRANGE = [
+    Polynomial.fromroots(np.delete(_NODES, g)) / np.prod(_NODES[g] - np.delete(_NODES, g))
+    for g in range(3)
+]
+
+
+def make_twist(spline: Spline, hose: solver.Hose, arc_lengths: Sequence[float], x: Array) -> Twist:
+    """Returns clamps with arbitrary directors and stretches without twist.
+
+    Args:
+        spline: the hose's geometry.
+        hose: its constants.
+        arc_lengths: of the clamps, ascending, (C,), m.
+        x: the unknowns.
+    """
+    s = np.array(arc_lengths, dtype=np.float64)
+    starts, values = spline.compute_basis(s)
+    n_spans, n_clamps = len(hose.tables.first), len(s)
+    flexible = bool(np.all(hose.elasticity.torsional_stiffness > 0.0))
+    is_scalar = spline.stride == 3 and flexible
+    n_stretches = max(n_clamps - 1, 0) if is_scalar else 0
+    ends = np.stack([np.arange(n_stretches), np.arange(n_stretches) + 1], axis=1)
+    weights = np.array(
+        [make_weights(spline, n_spans, s[first], s[last]) for first, last in ends]
+    ).reshape(n_stretches, n_spans, 3)
+    compliance = np.array([measure_compliance(hose, part) for part in weights])
+    n_frames = 3 * n_spans + n_clamps if spline.has_theta else 0
+    return Twist(
+        starts=starts,
+        places=s / hose.tables.span_length,
+        slopes=np.ascontiguousarray(values[:, 1]),
+        directors=make_directors(spline, s, x),
+        spin=np.zeros((n_clamps, 2)),
+        ends=ends,
+        spans=(starts // spline.stride)[ends],
+        weights=weights,
+        compliance=compliance,
+        angle=np.zeros(n_stretches),
+        trial=np.zeros(n_stretches),
+        torque=np.zeros(n_stretches),
+        frames=np.zeros((n_frames, 10)),
+        kept=np.zeros((n_frames, 10)),
+        turn_rows=np.zeros(n_clamps, dtype=np.int64),
+        carried=np.zeros((n_stretches, 7)),
+        rows=np.zeros((n_stretches, spline.size + 4 * spline.stride)),
+    )
+
+
+def make_directors(spline: Spline, arc_lengths: Array, x: Array) -> Array:
+    """Returns unit tangents and some unit vectors normal to them at arc lengths (C,), (C, 6)."""
+    directors = np.zeros((len(arc_lengths), 6))
+    for row, tangent in enumerate(spline.evaluate(arc_lengths, x, 1)):
+        length = float(np.linalg.norm(tangent))
+        unit = tangent / length if length > 1e-12 else np.eye(3)[0]
+        directors[row] = np.concatenate([unit, find_normal(unit)])
+    return directors
+
+
+def find_normal(tangent: Array) -> Array:
+    """Returns some unit vector (3,) normal to a unit tangent (3,)."""
+    away = np.eye(3)[int(np.argmin(np.abs(tangent)))]
+    normal = np.cross(tangent, away)
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def make_weights(spline: Spline, n_spans: int, start: float, end: float) -> Array:
+    """Returns lengths that the Gauss points stand for between two arc lengths, (S, 3), m.
+
+    Where a clamp is inside a span the weights integrate parabolas over the part exactly.
+    """
+    length = spline.length / n_spans
+    weights = np.zeros((n_spans, 3))
+    for e in range(n_spans):
+        low = 2.0 * np.clip(start / length - e, 0.0, 1.0) - 1.0
+        high = 2.0 * np.clip(end / length - e, 0.0, 1.0) - 1.0
+        for g, polynomial in enumerate(_LAGRANGE):
+            area = polynomial.integ()
+            weights[e, g] = 0.5 * length * (area(high) - area(low))
+    return weights
+
+
+def measure_compliance(hose: solver.Hose, weights: Array) -> float:
+    """Returns the integral of ds / GJ over a stretch, 1 / (N m)."""
+    return float(np.sum(weights / hose.elasticity.torsional_stiffness))
+
+
+def share_twist(spline: Spline, hose: solver.Hose, new: Twist, old: Twist) -> Array:
+    """Returns the angle (K,) of the new stretches when the material keeps its twist."""
+    length = hose.tables.span_length
+    angle = np.zeros(len(new.angle))
+    for k, ends in enumerate(new.ends):
+        for other, others in enumerate(old.ends):
+            start = length * max(new.places[ends[0]], old.places[others[0]])
+            end = length * min(new.places[ends[1]], old.places[others[1]])
+            if start < end:
+                part = make_weights(spline, len(new.weights[k]), start, end)
+                share = measure_compliance(hose, part) / old.compliance[other]
+                angle[k] += share * old.angle[other]
+    return angle
+
+
+def turn_director(twist: Twist, clamp: int, angle: float) -> None:
+    """Turns the director of a clamp about its tangent, right-handed."""
+    tangent, director = twist.directors[clamp, :3], twist.directors[clamp, 3:].copy()
+    across = np.cross(tangent, director)
+    twist.directors[clamp, 3:] = np.cos(angle) * director + np.sin(angle) * across
+
+
+def take_over_twist(
+    spline: Spline, hose: solver.Hose, new: Twist, old: Twist, same: dict[int, int], x: Array
+) -> None:
+    """Gives new clamps and stretches the material's present angles.
+
+    Args:
+        spline: the hose's geometry.
+        hose: its constants.
+        new: as made by `make_twist`; written.
+        old: what was there before, a closed loop parted.
+        same: the clamp in `old` of each clamp of `new` that was there.
+        x: the unknowns.
+    """
+    for clamp, before in same.items():
+        new.directors[clamp] = old.directors[before]
+        new.spin[clamp] = old.spin[before]
+    wanted = share_twist(spline, hose, new, old)
+    anchor = min(same, default=0)
+    span = make_span()
+
+    def measure(k: int) -> float:
+        new.trial[:] = wanted
+        run_kernel(measure_twist, spline.axes, hose.tables, new, x, span)
+        return float(new.trial[k])
+
+    for k in range(anchor, len(wanted)):
+        found = measure(k)
+        if k + 1 in same:
+            wanted[k] = found
+        else:
+            turn_director(new, k + 1, wanted[k] - found)
+    for k in range(anchor - 1, -1, -1):
+        turn_director(new, k, measure(k) - wanted[k])
+    new.angle[:] = wanted
+
+
+def settle(twist: Twist) -> None:
+    """Gives all stretches the moment of their present angle."""
+    twist.trial[:] = twist.angle
+    twist.torque[:] = twist.angle / twist.compliance
+
+
+def join_ends(twist: Twist, spin: float) -> Twist:
+    """Returns the twist of a closed loop: its first leg and its last become one stretch.
+
+    The directors of its ends are glued at one tangent, so they stay together from then on wherever
+    it goes.
+
+    Args:
+        twist: of its legs as stretches of an open hose, with clamps at both ends; written.
+        spin: what the last end is turned by before (rad).
+    """
+    last = len(twist.starts) - 1
+    turn_director(twist, last, spin)
+    twist.angle[-1:] += spin
+    between = twist.directors[0, :3] + twist.directors[last, :3]
+    between /= np.linalg.norm(between)
+    for clamp in (0, last):
+        tangent, director = twist.directors[clamp, :3], twist.directors[clamp, 3:]
+        twist.directors[clamp, 3:] = carry_director(tangent, between, director)
+        twist.directors[clamp, :3] = between
+    if len(twist.ends) < 2:
+        return twist
+    compliance, angle = twist.compliance[:-1].copy(), twist.angle[:-1].copy()
+    compliance[0] += twist.compliance[-1]
+    angle[0] += twist.angle[-1]
+    return twist._replace(
+        compliance=compliance,
+        angle=angle,
+        trial=angle.copy(),
+        torque=np.zeros_like(angle),
+        rows=twist.rows[:-1].copy(),
+    )
+
+
+def part_ends(spline: Spline, hose: solver.Hose, twist: Twist, x: Array) -> Twist:
+    """Returns the legs of a closed loop as stretches of an open hose; see `join_ends`.
+
+    The first leg and the last each get the angle that their compliance asks for, so the material
+    between them is where it really is.
+    """
+    if len(twist.ends) == len(twist.angle):
+        return twist
+    compliance = np.array([measure_compliance(hose, part) for part in twist.weights])
+    angle = (twist.angle / twist.compliance)[find_owners(twist)] * compliance
+    parted = twist._replace(
+        directors=twist.directors.copy(),
+        compliance=compliance,
+        angle=angle,
+        trial=angle.copy(),
+        torque=np.zeros_like(angle),
+        rows=np.zeros((len(angle), twist.rows.shape[1])),
+    )
+    run_kernel(measure_twist, spline.axes, hose.tables, parted, x, make_span())
+    gap = float(parted.trial[0] - angle[0])
+    for clamp in (0, len(parted.starts) - 1):
+        turn_director(parted, clamp, gap)
+    return parted
+
+
+def take_over_frames(new: Twist, old: Twist, same: dict[int, int], n_spans: int) -> None:
+    """Gives the frames of a hose with theta to a new set of clamps; see `take_over_twist`."""
+    first = 3 * n_spans
+    new.kept[:first] = old.kept[:first]
+    for clamp, place in enumerate(new.places):
+        row = first + clamp
+        if clamp in same:
+            new.kept[row] = old.kept[first + same[clamp]]
+            new.spin[clamp] = old.spin[same[clamp]]
+            continue
+        inside = place - min(int(place), n_spans - 1)
+        nearest = int(np.argmin(np.abs(0.5 + 0.5 * _NODES - inside)))
+        near = new.kept[3 * min(int(place), n_spans - 1) + nearest]
+        tangent = new.directors[clamp, :3]
+        new.kept[row, :3] = tangent
+        new.kept[row, 6:9] = carry_director(near[:3], tangent, near[6:9])
+    new.frames[:] = new.kept
+
+
+def carry_director(start: Array, end: Array, director: Array) -> Array:
+    """Returns a director (3,) after the smallest rotation of the unit vector start to end."""
+    factor = (director @ end) / max(1.0 + float(start @ end), 1e-6)
+    return np.asarray(director - factor * (start + end))

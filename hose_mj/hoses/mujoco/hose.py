@@ -1,0 +1,287 @@
+"""The protocol for a hose inside an mjModel of its own, whatever its bodies are.
+
+What holds the hose is part of the mjModel, so every clamp, attachment and release makes the model
+anew and carries the state over.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hose_mj.errors import InputError
+from hose_mj.hoses.inputs import (
+    check_arc_lengths,
+    check_count,
+    check_curve_points,
+    check_vector,
+    sample_curve,
+    sample_velocity,
+)
+from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
+from hose_mj.hoses.mujoco.chain_layout import exponential, multiply, rotation_matrix, turn_frame
+from hose_mj.hoses.mujoco.model import MujocoModel
+from hose_mj.hoses.mujoco.queries import MujocoQueries
+from hose_mj.hoses.protocol import Array, Curve, Hold, Linearization, Reaction
+from hose_mj.hoses.spec import HoseSpec, check_number
+
+
+class MujocoHose(MujocoQueries):
+    """The `HoseModel` protocol on top of a `MujocoModel`.
+
+    Args:
+        spec: what the hose is made of.
+        straight: direction (3,) in which it lies at first.
+
+    Attributes:
+        fallbacks: always 0; hoses with a solver of their own count here.
+    """
+
+    def __init__(self, spec: HoseSpec, straight: Array) -> None:
+        self.spec, self.fallbacks = spec, 0
+        self._next_number = 0
+        self.reset(lambda s: s[:, None] * straight)
+
+    @abstractmethod
+    def _make_model(self, held: Sequence[Held]) -> MujocoModel:
+        """Compiles the hose with these holds.
+
+        Raises:
+            InputError: holds that are too close to each other.
+        """
+
+    @property
+    @abstractmethod
+    def timestep(self) -> float:
+        """Length of one step (s)."""
+
+    @property
+    def twists(self) -> bool:
+        """Whether the hose can turn about its tangent against itself."""
+        return False
+
+    # Shape, holds and loads.
+
+    def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
+        """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads."""
+        made = self._make_model([])
+        points = sample_curve(curve, self.spec.length, made.nodes)
+        check_curve_points(points)
+        points = self._check_points("curve", points)
+        speeds = None
+        if velocity is not None:
+            speeds = sample_velocity(velocity, self.spec.length, made.nodes)
+        made.lay(points, speeds)
+        self._model, self._held, self._loads = made, list[Held](), list[Load]()
+
+    def clamp(
+        self,
+        arc_length: float,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+    ) -> Hold:
+        """Holds a point, the tangent and, where there is any, the twist; by default as they are."""
+        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        where = self._check_target(s, position)
+        frame = self._model.motion().frame(s)
+        if tangent is not None:
+            frame = turn_frame(frame, self._check_tangent(tangent))
+        return self._add_hold(s, where, frame, fixes_tangent=True)
+
+    def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
+        """Holds a point and leaves the tangent free; by default where it is now."""
+        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        where = self._check_target(s, position)
+        return self._add_hold(s, where, np.array([1.0, 0.0, 0.0, 0.0]), fixes_tangent=False)
+
+    def move(
+        self,
+        hold: Hold,
+        position: ArrayLike | None = None,
+        tangent: ArrayLike | None = None,
+        spin: float = 0.0,
+    ) -> None:
+        """Sets where a hold is to be at the end of the next step; see `HoseModel.move`.
+
+        A part of the world that is to move becomes an equality constraint first: MuJoCo takes a
+        moved fixed body's children along without inertia.
+
+        Raises:
+            InputError: a tangent or spin for an attachment, a spin for a hose without twist, or
+                spins that add up to pi or more in one step: a weld would go the shorter way.
+        """
+        place = self._find(hold)
+        held = self._held[place]
+        where, frame = held.position, held.frame
+        if position is not None:
+            where = self._check_target(hold.arc_length, position)
+        if not hold.fixes_tangent and (tangent is not None or spin != 0.0):
+            name, value = ("spin", spin) if tangent is None else ("tangent", tangent)
+            raise InputError(f"{name} of an attachment", value, "only a clamp's to set")
+        if tangent is not None:
+            frame = turn_frame(frame, self._check_tangent(tangent))
+        spun = held.spun + self._check_spin(held, spin)
+        if spin != 0.0:
+            frame = multiply(exponential(spin * rotation_matrix(frame)[:, 0]), frame)
+        moved = replace(held, position=where, frame=frame, spun=spun)
+        if held.rigid and (np.any(where != held.position) or np.any(frame != held.frame)):
+            moved = replace(moved, rigid=False)
+            start = replace(held, rigid=False)
+            self._rebuild([*self._held[:place], start, *self._held[place + 1 :]])
+        self._held[place] = moved
+
+    def release(self, hold: Hold) -> None:
+        """Lets go."""
+        place = self._find(hold)
+        self._rebuild(self._held[:place] + self._held[place + 1 :])
+
+    def reaction(self, hold: Hold) -> Reaction:
+        """Force and moment of a hold on the hose at the end of the last step."""
+        held = self._held[self._find(hold)]
+        self._model.update_forces(self._loads)
+        if hold.number in self._model.settled:
+            exact = self._model.settled[hold.number]
+            return Reaction(exact.force.copy(), exact.moment.copy())
+        return self._model.reaction(held)
+
+    def apply_force(self, arc_length: float, force: ArrayLike) -> None:
+        """Adds a point force (3,) N in the world frame that acts until `clear_loads`."""
+        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        self._add_load(Load(s, check_vector("force", force), np.zeros(3)))
+
+    def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
+        """Adds a point moment (3,) N m in the world frame that acts until `clear_loads`."""
+        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        self._add_load(Load(s, np.zeros(3), check_vector("moment", moment)))
+
+    def clear_loads(self) -> None:
+        """Drops all point forces and moments; gravity stays."""
+        self._loads = []
+        self._model.write_loads([])
+        self._model.forget()
+
+    # Motion.
+
+    def step(self, n_steps: int = 1) -> None:
+        """Advances the clock by n_steps time steps.
+
+        Raises:
+            StepError: MuJoCo met a NaN or a huge number; the state before the call is kept.
+        """
+        if check_count("n_steps", n_steps, 0) == 0:
+            return
+        self._model.step(n_steps, self._held, self._loads)
+        self._held = [held.arrived() for held in self._held]
+
+    def solve_static(self) -> None:
+        """Moves the hose to static equilibrium under its holds and loads, velocity zero.
+
+        Holds are exact here. Unstable equilibria are left, but not by a shape exactly in one, and
+        not where a moment acts.
+
+        Raises:
+            StepError: no equilibrium was found; the state before is kept.
+        """
+        self._model.settle(self._held, self._loads)
+        self._held = [held.arrived() for held in self._held]
+
+    def linearize(self) -> Linearization:
+        """Mass, tangent stiffness and constraints at rest, in the model's own coordinates."""
+        return self._model.linearize(self._held, self._loads)
+
+    # State in and out.
+
+    def snapshot(self) -> dict[str, Any]:
+        """Holds (k, 19), loads (k, 7), the next hold's number and MuJoCo's integration state.
+
+        And that before the last step where it moved holds, for what is read off of their forces.
+        """
+        return {
+            "holds": stack_rows(self._held, Held.WIDTH),
+            "loads": stack_rows(self._loads, Load.WIDTH),
+            "next_number": self._next_number,
+            "numbers": self._model.get_numbers(),
+            "replay": self._model.replay.copy(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot of this hose."""
+        missing = {"holds", "loads", "next_number", "numbers", "replay"} - state.keys()
+        if missing:
+            raise InputError("state", sorted(state), f"a snapshot; {sorted(missing)} missing")
+        held = [Held.from_numbers(row) for row in np.asarray(state["holds"])]
+        made = self._make_model(held)
+        made.set_numbers(np.asarray(state["numbers"]))
+        made.replay = np.asarray(state["replay"])
+        self._model, self._held = made, held
+        self._loads = [Load.from_numbers(row) for row in np.asarray(state["loads"])]
+        self._next_number = int(state["next_number"])
+
+    # What a kind of hose may say for itself.
+
+    def _check_points(self, name: str, points: Array) -> Array:
+        """Returns points (k, 3), m; raises `InputError` for one where this hose cannot be."""
+        return points
+
+    def _check_direction(self, tangent: Array) -> Array:
+        """Returns a unit tangent (3,); raises `InputError` for one that this hose cannot have."""
+        return tangent
+
+    def _is_root(self, arc_length: float) -> bool:
+        """Whether a clamp there makes a part of the hose part of the world while it is at rest."""
+        return False
+
+    # Details.
+
+    def _check_target(self, arc_length: float, position: ArrayLike | None) -> Array:
+        """Where a hold is to be; by default where its point is now."""
+        if position is None:
+            return np.asarray(self.position(arc_length)[0])
+        where = check_vector("position", position)
+        return np.asarray(self._check_points("position", where[None])[0])
+
+    def _check_tangent(self, tangent: ArrayLike) -> Array:
+        direction = check_vector("tangent", tangent)
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            raise InputError("tangent", tangent, "a vector that is not zero")
+        return self._check_direction(direction / length)
+
+    def _check_spin(self, held: Held, spin: float) -> float:
+        """Returns a spin (rad) that is finite, possible here and below pi with those before."""
+        check_number("spin", spin, may_be_zero=True, may_be_negative=True)
+        if spin != 0.0 and not self.twists:
+            raise InputError("spin", spin, f"0 for a {type(self).__name__}, which has no twist")
+        if abs(held.spun + spin) >= np.pi:
+            raise InputError("spin", spin, "turns (rad) that add up to less than pi in one step")
+        return spin
+
+    def _find(self, hold: Hold) -> int:
+        """Place of a hold among those that act now."""
+        for place, held in enumerate(self._held):
+            if held.hold == hold:
+                return place
+        raise InputError("hold", hold, f"one of {[held.hold for held in self._held]}")
+
+    def _add_hold(self, s: float, where: Array, frame: Array, fixes_tangent: bool) -> Hold:
+        hold = Hold(self._next_number, s, fixes_tangent)
+        rigid = fixes_tangent and self._is_root(s)
+        self._rebuild([*self._held, Held(hold, where, frame, where, frame, rigid)])
+        self._next_number += 1
+        return hold
+
+    def _add_load(self, load: Load) -> None:
+        self._loads.append(load)
+        self._model.forget()
+
+    def _rebuild(self, held: Sequence[Held]) -> None:
+        """Makes the model for these holds and lays it where the present one is."""
+        made = self._make_model(held)
+        made.take_over(self._model.motion(), held)
+        made.data.time = self.time
+        self._model, self._held = made, list(held)

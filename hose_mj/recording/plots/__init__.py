@@ -1,0 +1,1 @@
+"""Plots of hoses, errors and costs, in one style."""

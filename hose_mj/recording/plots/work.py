@@ -1,0 +1,251 @@
+"""Work-precision plot: error over cost, each model by its best settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from matplotlib.ticker import FuncFormatter
+
+from hose_mj.recording.episode import Array
+from hose_mj.recording.plots.axes import (
+    ERRORS,
+    PLAIN,
+    check_some,
+    draw_levels,
+    format_percent,
+    format_seconds,
+    is_positive,
+    set_log,
+)
+from hose_mj.recording.plots.gaps import Gap, draw_gap, trace_gap
+from hose_mj.recording.plots.labels import Label, label_points
+from hose_mj.recording.plots.palette import name_model
+from hose_mj.recording.plots.style import (
+    DPI,
+    SOFT,
+    Look,
+    add_legend,
+    choose_looks,
+    encode_png,
+    make_axes,
+)
+
+
+@dataclass(frozen=True)
+class WorkPoint:
+    """One setting of one model with its cost.
+
+    Attributes:
+        model: model id, or "geds planar"; points of one model make a series.
+        label: the setting, short ("16, 1 ms").
+        error: as a fraction.
+        wall_s_per_sim_s: wall over simulated time.
+        clamp_corrected: True or False for a model whose clamp needs correcting, else None.
+    """
+
+    model: str
+    label: str
+    error: float
+    wall_s_per_sim_s: float
+    clamp_corrected: bool | None = None
+
+    @property
+    def is_raw(self) -> bool:
+        """Whether this is a result before its clamp was corrected."""
+        return self.clamp_corrected is False and not self.model.startswith("geds")
+
+
+def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()) -> bytes:
+    """Error against cost, both logarithmic; lower left is better.
+
+    The line of a model joins its Pareto front: the settings that no other of its settings beats in
+    both error and cost. Only they are marked and labelled; all others are faint dots. Hollow marks
+    on dotted lines are raw, filled ones clamp-corrected or in no need of it.
+    """
+    check_some("points", points)
+    with make_axes(title, (8.4, 5.4)) as (figure, axes):
+        drawing = draw_work_precision(axes, points, gaps)
+        add_legend(figure, drawing.handles)
+        label_work_precision(figure, axes, drawing)
+        return encode_png(figure)
+
+
+@dataclass(frozen=True)
+class WorkDrawing:
+    """What was drawn, for its legend and its labels.
+
+    Attributes:
+        handles: what the legend has to hold.
+        fronts: of the series that are not raw.
+        lines: x and y of what labels keep off.
+        gaps: with an arrow each.
+        texts: already written.
+        looks: by model.
+    """
+
+    handles: list[Line2D]
+    fronts: list[list[WorkPoint]]
+    lines: list[tuple[Array, Array]]
+    gaps: Sequence[Gap]
+    texts: list[Text]
+    looks: Mapping[str, Look]
+
+
+def draw_work_precision(
+    axes: Axes, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()
+) -> WorkDrawing:
+    """Draws all but the labels of points into axes."""
+    drawn = [p for p in points if is_positive(p.error) and is_positive(p.wall_s_per_sim_s)]
+    looks = choose_looks(list(dict.fromkeys(p.model for p in points)))
+    fronts = {
+        key: _draw_series(axes, [p for p in drawn if (p.model, p.is_raw) == key], looks[key[0]])
+        for key in dict.fromkeys((p.model, p.is_raw) for p in drawn)
+    }
+    set_log(axes, x=True, y=True)
+    axes.set_xlabel("wall time per simulated second")
+    axes.set_ylabel("error")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: format_seconds(value)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_percent(value)))
+    texts = draw_levels(axes, ERRORS)
+    _draw_real_time(axes)
+    texts += [draw_gap(axes, gap, looks[gap.against]) for gap in gaps]
+    lines = [
+        (np.array([p.wall_s_per_sim_s for p in front]), np.array([p.error for p in front]))
+        for front in fronts.values()
+    ]
+    handles = _make_handles(looks, drawn, len(points) - len(drawn))
+    shown = [front for (_, raw), front in fronts.items() if not raw]
+    return WorkDrawing(handles, shown, lines, gaps, texts, looks)
+
+
+def label_work_precision(
+    figure: Figure, axes: Axes, drawing: WorkDrawing, spacing: float = 20.0
+) -> None:
+    """Labels front points `spacing` apart (points of length), once the rest is laid out."""
+    figure.draw_without_rendering()
+    lines = drawing.lines + [trace_gap(axes, gap) for gap in drawing.gaps]
+    wanted = _choose_labels(axes, drawing.fronts, drawing.looks, spacing)
+    label_points(figure, axes, wanted, lines, drawing.texts)
+
+
+def find_pareto_front(cost: Array, error: Array) -> Array:
+    """Returns the indices, by rising cost, of the points that no other beats in both."""
+    best, front = np.inf, []
+    for i in np.lexsort((error, cost)):
+        if error[i] < best:
+            best = error[i]
+            front.append(int(i))
+    return np.array(front, dtype=int)
+
+
+def _draw_series(axes: Axes, group: Sequence[WorkPoint], look: Look) -> list[WorkPoint]:
+    """Draws one series, its front in full and the rest faint, and returns the front."""
+    raw = group[0].is_raw
+    cost = np.array([p.wall_s_per_sim_s for p in group])
+    error = np.array([p.error for p in group])
+    front = find_pareto_front(cost, error)
+    beaten = np.setdiff1d(np.arange(len(group)), front)
+    faint: dict[str, Any] = {"ls": "", "marker": look.marker, "ms": 2.6, "alpha": 0.28, "mew": 0.5}
+    face = "none" if raw else look.color
+    axes.plot(cost[beaten], error[beaten], color=look.color, mfc=face, zorder=2, **faint)
+    axes.plot(
+        cost[front],
+        error[front],
+        color=look.color,
+        ls=":" if raw else "-",
+        lw=0.9 if raw else 1.3,
+        marker=look.marker,
+        ms=4.2 if raw else 5.0,
+        mfc="white" if raw else look.color,
+        mec=look.color if raw else "white",
+        mew=0.9 if raw else 0.5,
+        alpha=0.5 if raw else 1.0,
+        zorder=3 if raw else 4,
+    )
+    return [group[i] for i in front]
+
+
+def _draw_real_time(axes: Axes) -> None:
+    """A line where a simulated second takes a second."""
+    low, high = axes.get_xlim()
+    if low < 1.0 < high:
+        axes.axvline(1.0, color="#bbbbbb", lw=0.8, zorder=1)
+        axes.annotate(
+            "real time",
+            (1.0, 0.985),
+            xycoords=("data", "axes fraction"),
+            xytext=(-2, 0),
+            textcoords="offset points",
+            rotation=90,
+            ha="right",
+            va="top",
+            color=SOFT,
+            fontsize=7.5,
+        )
+
+
+def _choose_labels(
+    axes: Axes,
+    fronts: Sequence[Sequence[WorkPoint]],
+    looks: Mapping[str, Look],
+    spacing: float,
+) -> list[Label]:
+    """Labels of front points: first those that reach a level most cheaply, then some others.
+
+    The others of a series stand `spacing` apart from all that were chosen before them.
+    """
+    first = [p for front in fronts for p in _find_reaching(front)]
+    chosen = list(first)
+    for front in fronts:
+        near = [_locate(axes, p) for p in first if p in front]
+        for p in (front[0], front[-1], *front):
+            here = _locate(axes, p)
+            if all(np.hypot(*(here - other)) >= spacing * DPI / 72.0 for other in near):
+                near.append(here)
+                chosen.append(p)
+    return [
+        Label(
+            p.wall_s_per_sim_s,
+            p.error,
+            p.label,
+            looks[p.model].ink,
+            -1 if p.model == "geds planar" else 1,
+        )
+        for p in dict.fromkeys(chosen)
+    ]
+
+
+def _find_reaching(front: Sequence[WorkPoint]) -> list[WorkPoint]:
+    """The cheapest point below each level."""
+    reached = ([p for p in front if p.error <= level] for level in ERRORS)
+    return [min(some, key=lambda p: p.wall_s_per_sim_s) for some in reached if some]
+
+
+def _locate(axes: Axes, point: WorkPoint) -> Array:
+    """Where a point lies, in pixels."""
+    return np.asarray(axes.transData.transform((point.wall_s_per_sim_s, point.error)))
+
+
+def _make_handles(
+    looks: Mapping[str, Look], drawn: Sequence[WorkPoint], n_hidden: int
+) -> list[Line2D]:
+    """Names the models, says what hollow and faint mean, and how many points cannot be shown."""
+    handles = [
+        Line2D([], [], color=look.color, marker=look.marker, lw=1.3, label=name_model(model))
+        for model, look in looks.items()
+    ]
+    faint: dict[str, Any] = {"color": PLAIN, "alpha": 0.6}
+    if any(p.is_raw for p in drawn):
+        text = "clamp as documented"
+        handles.append(Line2D([], [], ls=":", lw=0.9, marker="s", mfc="w", label=text, **faint))
+    handles.append(Line2D([], [], ls="", marker="o", ms=2.6, label="other settings", **faint))
+    if n_hidden:
+        handles.append(Line2D([], [], ls="", label=f"{n_hidden} not drawn (not above 0)"))
+    return handles

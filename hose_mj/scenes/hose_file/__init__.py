@@ -1,0 +1,1 @@
+"""A user's hose, described in a TOML file."""

@@ -1,0 +1,1 @@
+"""Scenes with robots and a hose, described in MJCF."""

@@ -1,0 +1,1 @@
+"""The line task: robots that pull a hose of line segments over a grid."""

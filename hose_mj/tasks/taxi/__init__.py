@@ -1,0 +1,1 @@
+"""The taxi task with several taxis."""

@@ -1,0 +1,148 @@
+"""The multi-agent taxi problem (thesis B.3): map, settings, and the task made from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from hose_mj.errors import InputError
+from hose_mj.tasks.checks import check_cells, check_choice, check_finite, check_integer
+from hose_mj.tasks.kernels import HEADER, Integers
+from hose_mj.tasks.task import Task, make_reward_table
+from hose_mj.tasks.taxi.settings import kernels as rules
+from hose_mj.tasks.variables import Variable
+
+Cell = tuple[int, int]
+
+STATIONS: dict[str, Cell] = {"R": (0, 0), "G": (0, 4), "Y": (4, 0), "B": (4, 3)}
+"""Cells (row, column), row 0 at the top (Dietterich 2000)."""
+
+WALLS_RIGHT_OF = ((0, 1), (1, 1), (3, 0), (3, 2), (4, 0), (4, 2))
+"""The cells with an inner wall on their right."""
+
+ACTIONS = ("up", "right", "down", "left", "pick", "drop")
+FLAGS = ("up", "down", "left", "right")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaxiSettings:
+    """Taxis that carry passengers on Dietterich's 5 x 5 map (thesis B.3).
+
+    Attributes:
+        starts: first cells (row, column) of one or two taxis.
+        passengers: one to three pairs of stations (R, G, Y, B), from and to.
+        single_agent: one agent chooses for all taxis at once (section 5.5.2).
+        goal_reward: for all, when every passenger is delivered.
+        collision_reward: for running into a wall or the other taxi.
+        misplaced_reward: for picking or dropping where it does nothing.
+        step_limit: actions of single taxis after which an episode is cut off.
+
+    Raises:
+        InputError: a value outside its valid set, or taxis that start on one cell.
+    """
+
+    starts: tuple[Cell, ...] = ((2, 2), (2, 1))
+    passengers: tuple[tuple[str, str], ...] = (("R", "B"), ("G", "Y"))
+    single_agent: bool = False
+    goal_reward: float = 100.0
+    collision_reward: float = -10.0
+    misplaced_reward: float = 0.0
+    step_limit: int = 2000
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.starts, tuple) or not 1 <= len(self.starts) <= 2:
+            raise InputError("starts", self.starts, "a tuple of one or two cells (row, column)")
+        check_cells("starts", self.starts, len(self.starts), 0, rules.WIDTH - 1)
+        if len(set(self.starts)) < len(self.starts):
+            raise InputError("starts", self.starts, "different cells")
+        if not isinstance(self.passengers, tuple) or not 1 <= len(self.passengers) <= 3:
+            raise InputError("passengers", self.passengers, "a tuple of one to three pairs")
+        for pair in self.passengers:
+            known = isinstance(pair, tuple) and all(station in list(STATIONS) for station in pair)
+            if not known or len(pair) != 2 or pair[0] == pair[1]:
+                valid = "pairs of two different stations of " + ", ".join(STATIONS)
+                raise InputError("passengers", self.passengers, valid)
+        check_choice("single_agent", self.single_agent, (True, False))
+        for name in ("goal_reward", "collision_reward", "misplaced_reward"):
+            check_finite(name, getattr(self, name))
+        check_integer("step_limit", self.step_limit, 1, 10**9)
+
+
+def make_taxi(settings: TaxiSettings) -> Task:
+    """Makes the taxi task."""
+    n, single = len(settings.starts), settings.single_agent
+    kinds = [f"_{taxi}" for taxi in range(n)] if single else [""]
+    events = (*(f"{name}{k}" for k in kinds for name in ("collision", "misplaced")), "goal")
+    worth = {
+        "goal": {"goal": settings.goal_reward},
+        "collision": {f"collision{k}": settings.collision_reward for k in kinds},
+        "misplaced": {f"misplaced{k}": settings.misplaced_reward for k in kinds},
+    }
+    agents = ("taxis",) if single else tuple(f"taxi_{taxi}" for taxi in range(n))
+    actions: tuple[str, ...] = ACTIONS
+    if single:
+        choices = product(ACTIONS, repeat=n)
+        actions = tuple("+".join(f"{name}_{k}" for k, name in enumerate(c)) for c in choices)
+    goal = 1 << len(events) - 1
+    places = {name: rules.WIDTH * row + column for name, (row, column) in STATIONS.items()}
+    record = rules.Taxi(
+        n_agents=len(agents),
+        n_actions=len(actions),
+        step_limit=settings.step_limit,
+        terminal=goal,
+        violations=sum(rules.COLLISION << 2 * k for k in range(len(kinds))),
+        success=goal,
+        shared=goal,
+        reward_table=make_reward_table(events, worth),
+        n_taxis=n,
+        single_agent=single,
+        walls=_make_walls(),
+        starts=np.array([rules.WIDTH * row + column for row, column in settings.starts], np.int64),
+        origins=np.array([places[a] for a, _ in settings.passengers], np.int64),
+        destinations=np.array([places[b] for _, b in settings.passengers], np.int64),
+    )
+    end = HEADER + n + len(settings.passengers)
+    return Task(
+        id="taxi",
+        agents=agents,
+        action_names=actions,
+        variables=_list_variables(settings),
+        rewards=tuple(worth),
+        events=events,
+        schedule="single" if single else "turns",
+        settings=settings,
+        kernel=record,
+        layout={"taxis": slice(HEADER, HEADER + n), "passengers": slice(HEADER + n, end)},
+        state_size=end,
+    )
+
+
+def _make_walls() -> Integers:
+    """Makes the walls (cell, direction) in the order up, right, down, left."""
+    walls = np.zeros((rules.WIDTH, rules.WIDTH, 4), np.int64)
+    walls[0, :, 0] = walls[:, -1, 1] = walls[-1, :, 2] = walls[:, 0, 3] = 1
+    for row, column in WALLS_RIGHT_OF:
+        walls[row, column, 1] = walls[row, column + 1, 3] = 1
+    return walls.reshape(-1, 4)
+
+
+def _list_variables(settings: TaxiSettings) -> tuple[Variable, ...]:
+    """Lists the variables in the order in which `taxi_kernels.observe_taxi` writes them."""
+    n = len(settings.starts)
+    meaning = f"waiting (0), in taxi k (k + 1), delivered ({n + 1})"
+    taxis = [Variable(f"taxi_{k}", rules.WIDTH**2, f"cell of taxi {k}") for k in range(n)]
+    passengers = [
+        Variable(f"passenger_{k}", n + 2, meaning) for k in range(len(settings.passengers))
+    ]
+    flag = "1 when a wall or a taxi is {} of {}"
+    if settings.single_agent:
+        flags = [
+            Variable(f"o_{way}_{k}", 2, flag.format(way, f"taxi {k}"))
+            for k in range(n)
+            for way in FLAGS
+        ]
+    else:
+        flags = [Variable(f"o_{way}", 2, flag.format(way, "the taxi"), True) for way in FLAGS]
+    return (*taxis, *passengers, *flags)

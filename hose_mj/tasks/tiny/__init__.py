@@ -1,0 +1,1 @@
+"""Grids small enough to solve exactly: a corridor and a maze."""

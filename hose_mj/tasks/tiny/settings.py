@@ -1,0 +1,193 @@
+"""Two tiny tasks of the thesis: the corridor of Example 1 and the maze of Table 5.1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hose_mj.errors import InputError
+from hose_mj.tasks import joint
+from hose_mj.tasks.checks import check_cell, check_choice, check_finite, check_integer
+from hose_mj.tasks.kernels import HEADER
+from hose_mj.tasks.task import Task, make_reward_table
+from hose_mj.tasks.tiny.kernels import COLLISION, DONE, GOAL, Corridor, Maze
+from hose_mj.tasks.variables import Variable
+
+DIRECTIONS = ("up", "down", "left", "right")
+WINNERS = {"first": joint.FIRST, "second": joint.SECOND, "neither": joint.NEITHER}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CorridorSettings:
+    """Two robots in a corridor of cells 0 .. n_cells - 1 (Example 1, section 6.4).
+
+    Attributes:
+        n_cells: length of the corridor.
+        goal: the goal's cell.
+        starts: first cells of the two robots.
+        goal_ends: what reaching the goal ends: the "cycle" of turns (Table 6.2) or the "move".
+        winner: who gets a cell that both enter at once (Table 6.1 allows "first" and "second").
+        goal_reward: for both, when a robot reaches the goal.
+        collision_reward: for both, when a robot hits a wall or the other robot.
+        step_limit: moves of single robots after which an episode is cut off.
+
+    Raises:
+        InputError: a value outside its range, or robots that start together or on the goal.
+    """
+
+    n_cells: int = 3
+    goal: int = 1
+    starts: tuple[int, int] = (0, 2)
+    goal_ends: Literal["cycle", "move"] = "cycle"
+    winner: Literal["first", "second", "neither"] = "first"
+    goal_reward: float = 100.0
+    collision_reward: float = -10.0
+    step_limit: int = 100
+
+    def __post_init__(self) -> None:
+        check_integer("n_cells", self.n_cells, 3, 1000)
+        last = self.n_cells - 1
+        check_integer("goal", self.goal, 0, last)
+        check_cell("starts", self.starts, (0, last), (0, last))
+        if len({self.goal, *self.starts}) < 3:
+            raise InputError("starts", self.starts, "two cells, neither of them the goal's")
+        check_choice("goal_ends", self.goal_ends, ("cycle", "move"))
+        check_choice("winner", self.winner, WINNERS)
+        check_finite("goal_reward", self.goal_reward)
+        check_finite("collision_reward", self.collision_reward)
+        check_integer("step_limit", self.step_limit, 1, 10**9)
+
+
+def make_corridor(settings: CorridorSettings) -> Task:
+    """Makes the corridor."""
+    events = ("collision", "goal", "done")
+    worth = {
+        "goal": {"goal": settings.goal_reward},
+        "collision": {"collision": settings.collision_reward},
+    }
+    record = Corridor(
+        n_agents=2,
+        n_actions=3,
+        step_limit=settings.step_limit,
+        terminal=DONE,
+        violations=COLLISION,
+        success=DONE,
+        shared=COLLISION | GOAL | DONE,
+        reward_table=make_reward_table(events, worth),
+        n_cells=settings.n_cells,
+        goal=settings.goal,
+        starts=np.array(settings.starts, np.int64),
+        goal_ends_move=settings.goal_ends == "move",
+        winner=WINNERS[settings.winner],
+    )
+    return Task(
+        id="corridor",
+        agents=("robot_0", "robot_1"),
+        action_names=("left", "right", "none"),
+        variables=tuple(
+            Variable(f"p_{robot}", settings.n_cells, f"cell of robot {robot}") for robot in (0, 1)
+        ),
+        rewards=tuple(worth),
+        events=events,
+        schedule="turns",
+        settings=settings,
+        kernel=record,
+        layout={"robots": slice(HEADER, HEADER + 2)},
+        state_size=HEADER + 2,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MazeSettings:
+    """One robot in the rooms of Table 5.1: 4 x 2 cells, walls above (0, 0) and (2, 0).
+
+    Attributes:
+        actions: "all" four directions, or "up" alone as in the table.
+        goal: cell (x, y) whose entry ends the episode; y counts upwards.
+        start: first cell (x, y), or "random" for any but the goal's.
+        goal_reward: for entering the goal's cell.
+        collision_reward: -k of the table.
+        step_limit: moves after which an episode is cut off.
+
+    Raises:
+        InputError: a value outside its range, or a robot that starts on the goal.
+    """
+
+    actions: Literal["all", "up"] = "all"
+    goal: tuple[int, int] = (0, 1)
+    start: tuple[int, int] | Literal["random"] = "random"
+    goal_reward: float = 100.0
+    collision_reward: float = -10.0
+    step_limit: int = 100
+
+    def __post_init__(self) -> None:
+        check_choice("actions", self.actions, ("all", "up"))
+        check_cell("goal", self.goal, (0, MAZE_SHAPE[0] - 1), (0, MAZE_SHAPE[1] - 1))
+        if self.start != "random":
+            check_cell("start", self.start, (0, MAZE_SHAPE[0] - 1), (0, MAZE_SHAPE[1] - 1))
+            if self.start == self.goal:
+                raise InputError("start", self.start, "a cell other than the goal's")
+        check_finite("goal_reward", self.goal_reward)
+        check_finite("collision_reward", self.collision_reward)
+        check_integer("step_limit", self.step_limit, 1, 10**9)
+
+
+MAZE_SHAPE = (4, 2)
+MAZE_WALLS_ABOVE = ((0, 0), (2, 0))
+
+
+def make_maze(settings: MazeSettings) -> Task:
+    """Makes the maze."""
+    events = ("collision", "goal")
+    worth = {
+        "goal": {"goal": settings.goal_reward},
+        "collision": {"collision": settings.collision_reward},
+    }
+    actions = DIRECTIONS if settings.actions == "all" else ("up",)
+    width, height = MAZE_SHAPE
+    start = (-1, -1) if settings.start == "random" else settings.start
+    record = Maze(
+        n_agents=1,
+        n_actions=len(actions),
+        step_limit=settings.step_limit,
+        terminal=GOAL,
+        violations=COLLISION,
+        success=GOAL,
+        shared=0,
+        reward_table=make_reward_table(events, worth),
+        width=width,
+        height=height,
+        goal_x=settings.goal[0],
+        goal_y=settings.goal[1],
+        start_x=start[0],
+        start_y=start[1],
+        walls=_make_walls(),
+    )
+    return Task(
+        id="maze",
+        agents=("robot_0",),
+        action_names=actions,
+        variables=(
+            Variable("x", width, "column"),
+            Variable("y", height, "row, counted upwards"),
+            *(Variable(f"o_{name}", 2, f"1 when a wall is {name}", True) for name in actions),
+        ),
+        rewards=tuple(worth),
+        events=events,
+        schedule="single",
+        settings=settings,
+        kernel=record,
+        layout={"robots": slice(HEADER, HEADER + 2)},
+        state_size=HEADER + 2,
+    )
+
+
+def _make_walls() -> np.ndarray[tuple[int, int, int], np.dtype[np.int64]]:
+    """Makes the walls (width, height, direction), the outer ones too."""
+    walls = np.zeros((*MAZE_SHAPE, 4), np.int64)
+    walls[:, -1, 0] = walls[:, 0, 1] = walls[0, :, 2] = walls[-1, :, 3] = 1
+    for x, y in MAZE_WALLS_ABOVE:
+        walls[x, y, 0] = walls[x, y + 1, 1] = 1
+    return walls

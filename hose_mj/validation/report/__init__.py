@@ -1,0 +1,1 @@
+"""What `hose-mj compare` writes: tables, pictures and the HTML page."""

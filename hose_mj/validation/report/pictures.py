@@ -1,0 +1,308 @@
+"""Pictures of `hose-mj compare`: what is drawn of which case, with which words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from hose_mj.recording.plots.api import api as plots
+from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
+from hose_mj.validation.report.obstacles import find_outlines
+from hose_mj.validation.run import Outcome
+from hose_mj.validation.study import SHOWN_WITHIN, Study
+
+Pictures = dict[str, bytes]
+"""PNG by file name without its suffix."""
+N_SNAPSHOTS = 6
+"""Instants drawn into one picture of shapes."""
+PLANAR = ("hinge-chain",)
+"""Peers that move in a plane, and are held against GEDS in a plane."""
+PARAMETERS = {
+    "heavy-cantilever": ("gamma-", "\u0393 = "),
+    "tip-load": ("", "PL\u00b2/EI = "),
+    "end-moment": ("", "ML/EI = "),
+}
+"""Family -> what its ids put before the parameter, and what plots put there."""
+FANS = ("heavy-cantilever", "tip-load", "end-moment")
+HERO = "released-rod"
+"""The case of the overview."""
+
+
+def draw_all(study: Study) -> Pictures:
+    """Returns the PNG of every plot by file name."""
+    pictures: Pictures = {}
+    for result in study.results:
+        if result.case.motion is not None and result.outcomes:
+            pictures.update(_draw_motion(result, study.ratios, study.shown_within))
+            if result.case.id == HERO and _has_hero_models(result):
+                pictures["overview"] = draw_overview(result, study.ratios)
+    for family, members in group_statics(study.results).items():
+        pictures.update(_draw_statics(family, members))
+    pictures.update(_draw_numerics(study))
+    if study.own is not None and study.own.own.duration is None and study.outcomes:
+        pictures.update(_draw_rest(study.results[0], study.shown_within))
+    return pictures
+
+
+def group_statics(results: list[CaseResult]) -> dict[str, list[CaseResult]]:
+    """Static results by family, in order."""
+    groups: dict[str, list[CaseResult]] = {}
+    for result in results:
+        if result.case.motion is None:
+            groups.setdefault(result.case.family, []).append(result)
+    return groups
+
+
+def choose_shown(result: CaseResult, within: float) -> dict[str, Outcome]:
+    """The run of each model that pictures show: the cheapest within an error, or the best."""
+    shown = {}
+    for model in dict.fromkeys(outcome.setting.model for outcome in result.outcomes):
+        best = find_cheapest(result.outcomes, model, within)
+        if best is None:
+            mine = [outcome for outcome in result.outcomes if outcome.setting.model == model]
+            best = min(mine, key=lambda outcome: outcome.error)
+        shown[model] = best
+    return shown
+
+
+def compute_distance(one: Outcome, other: Outcome) -> np.ndarray:
+    """Largest distance between two centre lines at each instant, (k,), m."""
+    return np.asarray(np.max(np.linalg.norm(one.points - other.points, axis=2), axis=1))
+
+
+def name_setting(outcome: Outcome) -> str:
+    """Resolution and time step, short: "12, 2.5 ms"."""
+    setting = outcome.setting
+    step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
+    return f"{setting.resolution}{step}"
+
+
+def describe_setting(outcome: Outcome) -> str:
+    """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
+    setting = outcome.setting
+    size = "control points" if setting.model == "geds" else "segments"
+    step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
+    return f"{setting.model}, {setting.resolution} {size}{step}"
+
+
+def name_series(outcome: Outcome) -> str:
+    """Model id, or "geds planar" for GEDS in a plane."""
+    setting = outcome.setting
+    return "geds planar" if setting.model == "geds" and setting.planar else setting.model
+
+
+def choose_ratios(ratios: Iterable[Ratio], case_id: str) -> list[Ratio]:
+    """The ratios of a case that compare like with like."""
+    return [
+        ratio
+        for ratio in ratios
+        if ratio.case == case_id and ratio.planar == (ratio.against in PLANAR)
+    ]
+
+
+def draw_overview(result: CaseResult, ratios: list[Ratio]) -> bytes:
+    """The motion at the left, errors and costs at the right: the picture of the README."""
+    shown = {m: o for m, o in choose_shown(result, SHOWN_WITHIN).items() if m in ("geds", "cable")}
+    curves, times = _pick_snapshots(shown)
+    names = [o.setting.resolution for o in shown.values()]
+    left = "A rod is let go"
+    if len(shown) == 2:
+        left += f"\n{names[0]} control points of GEDS over {names[1]} segments of MuJoCo's cable"
+    gaps = _list_gaps(result, ratios)
+    best = max((gap for gap in gaps if gap.against == "cable"), key=_ratio_of, default=None)
+    right = "What accuracy costs\nbest settings of each model; lower left is better"
+    if best is not None:
+        level, factor = f"{100 * best.at_error:g} %", f"{_ratio_of(best):.0f} times"
+        right = (
+            f"At {level} error the cable takes {factor} as long"
+            "\nbest settings of each model; labels: control points or segments, time step"
+        )
+    return plots.plot_overview(curves, times, _list_work(result), gaps, (left, right))
+
+
+def _has_hero_models(result: CaseResult) -> bool:
+    return any(outcome.setting.model in ("geds", "cable") for outcome in result.outcomes)
+
+
+def _ratio_of(gap: plots.Gap) -> float:
+    return gap.cost_against / gap.cost
+
+
+def _list_work(result: CaseResult) -> list[plots.WorkPoint]:
+    return [
+        plots.WorkPoint(
+            name_series(outcome),
+            name_setting(outcome),
+            outcome.error,
+            outcome.wall_s_per_sim_s or np.nan,
+            outcome.setting.clamp_corrected,
+        )
+        for outcome in result.outcomes
+    ]
+
+
+def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[plots.Gap]:
+    """The arrows of a picture: above a level the cable's, below it the hinge chain's."""
+    costs = {outcome.setting.label: outcome.wall_s_per_sim_s for outcome in result.outcomes}
+    gaps = []
+    for ratio in choose_ratios(ratios, result.case.id):
+        if ratio.against == "flex":
+            continue
+        cost, against = costs.get(ratio.model_setting), costs.get(ratio.against_setting)
+        if cost is not None and against is not None:
+            gaps.append(plots.Gap(ratio.at_error, ratio.against, cost, against))
+    return gaps
+
+
+def _pick_snapshots(shown: dict[str, Outcome]) -> tuple[dict[str, np.ndarray], list[float]]:
+    """Centre lines by legend entry, (N_SNAPSHOTS, m, 3), and their times (s)."""
+    one = next(iter(shown.values()))
+    picks = np.linspace(0, len(one.times) - 1, N_SNAPSHOTS).round().astype(int)
+    curves = {describe_setting(outcome): outcome.points[picks] for outcome in shown.values()}
+    return curves, [float(one.times[k]) for k in picks]
+
+
+def _draw_motion(result: CaseResult, ratios: list[Ratio], within: float) -> Pictures:
+    case = result.case
+    pictures = {
+        f"{case.id}-work-precision": plots.plot_work_precision(
+            case.title, _list_work(result), _list_gaps(result, ratios)
+        )
+    }
+    shown = choose_shown(result, within)
+    curves, times = _pick_snapshots(shown)
+    plane = choose_plane(curves.values())
+    outlines = find_outlines(case.obstacles, plane)
+    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, plane, times, outlines)
+    if "geds" in shown and len(shown) > 1:
+        pictures[f"{case.id}-distance"] = _draw_distance(shown)
+    return pictures
+
+
+def _draw_rest(result: CaseResult, within: float) -> Pictures:
+    """The rest shape that each model finds where it comes closest."""
+    curves = {
+        describe_setting(outcome): outcome.points
+        for outcome in choose_shown(result, within).values()
+    }
+    picture = plots.plot_shapes(result.case.title, curves, choose_plane(curves.values()))
+    return {f"{result.case.id}-shapes": picture}
+
+
+def choose_plane(curves: Iterable[np.ndarray]) -> tuple[int, int]:
+    """The two coordinates that show most of curves (..., 3): x or y over z, or x over y if flat."""
+    extent = np.ptp(np.concatenate([curve.reshape(-1, 3) for curve in curves]), axis=0)
+    if extent[2] < 0.1 * min(extent[:2]):
+        return 0, 1
+    return (0, 2) if extent[0] >= extent[1] else (1, 2)
+
+
+def _draw_distance(shown: dict[str, Outcome]) -> bytes:
+    ours = shown["geds"]
+    gaps = {
+        f"{model} {name_setting(outcome)}": compute_distance(ours, outcome)
+        for model, outcome in shown.items()
+        if model != "geds"
+    }
+    unit, factor = plots.choose_length_unit(max(float(gap.max()) for gap in gaps.values()))
+    return plots.plot_series(
+        f"Largest distance from GEDS {name_setting(ours)}",
+        f"distance ({unit})",
+        {label: (ours.times, factor * gap) for label, gap in gaps.items()},
+    )
+
+
+def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
+    points = [
+        plots.ErrorPoint(
+            outcome.setting.model,
+            _parameter(result) if len(members) > 1 else "",
+            outcome.setting.resolution,
+            outcome.error,
+            outcome.setting.clamp_corrected,
+        )
+        for result in members
+        for outcome in result.outcomes
+    ]
+    if not points:
+        return {}
+    title = members[0].case.title if len(members) == 1 else family.replace("-", " ").capitalize()
+    of = "reference" if members[0].case.scale is None else "length"
+    pictures = {family: plots.plot_errors(title, points, f"error (of the {of})")}
+    case = members[0].case
+    if case.obstacles or not case.planar:
+        ours = max(members[0].outcomes, key=lambda outcome: outcome.setting.resolution)
+        curve = ours.points[0]
+        plane = choose_plane([curve])
+        across = np.sort(np.ptp(curve, axis=0))
+        if across[1] > 0.01 * across[2]:  # a straight line is no picture
+            outlines = find_outlines(case.obstacles, plane)
+            curves = {describe_setting(ours): curve}
+            pictures[f"{family}-shapes"] = plots.plot_shapes(
+                title, curves, plane, outlines=outlines
+            )
+    if family in FANS and len(members) > 1:
+        fans = [_make_fan(members, "geds", None), _make_fan(members, "cable", False)]
+        pictures[f"{family}-shapes"] = plots.plot_fan(title, [fan for fan in fans if fan])
+    return pictures
+
+
+def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> plots.Fan | None:
+    """Equilibria of a model: GEDS at its finest, a chain at about 20 segments as documented."""
+    curves: dict[str, np.ndarray] = {}
+    resolution = 0
+    for result in members:
+        mine = [
+            outcome
+            for outcome in result.outcomes
+            if (outcome.setting.model, outcome.setting.clamp_corrected) == (model, corrected)
+        ]
+        if mine:
+            best = min(mine, key=lambda o: o.error if corrected is None else _far_from_20(o))
+            curves[_parameter(result)] = best.points[0]
+            resolution = best.setting.resolution
+    if not curves:
+        return None
+    if corrected is None:
+        return plots.Fan(model, curves)
+    name = f"{model}, {resolution} segments, clamp as documented"
+    return plots.Fan(name, curves, dotted=True)
+
+
+def _far_from_20(outcome: Outcome) -> int:
+    return abs(outcome.setting.resolution - 20)
+
+
+def _parameter(result: CaseResult) -> str:
+    """The parameter of a case for people: "\u0393 = 10"."""
+    tail = result.case.id.removeprefix(result.case.family).lstrip("-")
+    prefix, text = PARAMETERS.get(result.case.family, ("", ""))
+    return text + re.sub(r"^(\d*)pi$", "\\1\u03c0", tail.removeprefix(prefix))
+
+
+def _draw_numerics(study: Study) -> Pictures:
+    pictures: Pictures = {}
+    for title, curves in study.curves.items():
+        if title.startswith("Wall"):
+            pictures["cost"] = plots.plot_convergence(
+                title, "control points", curves, (1.0,), ylabel="wall time", in_seconds=True
+            )
+            continue
+        slopes = (4.0,) if "frequencies" in title else (3.0,) if "swing" in title else (1.0, 2.0)
+        xlabel = "time step (s)" if "time step" in title else "span length (m)"
+        name = title.lower().replace(" ", "-")
+        pictures[name] = plots.plot_convergence(
+            title, xlabel, curves, slopes, finer_is_larger=False
+        )
+    if study.energy is not None:
+        times, energies = study.energy
+        change = 100.0 * (np.asarray(energies) - 1.0)
+        pictures["energy"] = plots.plot_series(
+            "Energy of the released rod over ten seconds, BDF2 at 5 ms",
+            "change of energy (% of its start)",
+            {"geds, 12 points": (times, change)},
+            limits={"bound, +0.1 %": 0.1},
+        )
+    return pictures

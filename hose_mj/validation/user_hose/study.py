@@ -1,0 +1,268 @@
+"""Runs a user's hose within a budget: how far the models disagree, how fine each must be."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+
+from hose_mj.checks import Check
+from hose_mj.errors import InputError, StepError
+from hose_mj.hoses.registry import MODELS
+from hose_mj.scenes.hose_file.hose_file import OwnHose
+from hose_mj.validation.case import Case, Reference
+from hose_mj.validation.compare import CaseResult
+from hose_mj.validation.run import (
+    BUDGET_SPENT,
+    REFERENCE_POINTS,
+    Outcome,
+    Skipped,
+    compute_distance,
+    compute_reference,
+    run_ladder,
+    score_static,
+    stiffen,
+    time_rounds,
+)
+from hose_mj.validation.settings import (
+    SMALLEST_STEP,
+    Grid,
+    Setting,
+    list_ladders,
+    list_static,
+)
+from hose_mj.validation.user_hose.answers import (
+    Answer,
+    Disagreement,
+    list_answers,
+    list_disagreements,
+)
+from hose_mj.validation.user_hose.case import CASE_ID, find_fineness, make_case
+from hose_mj.validation.user_hose.grid import GRID, can_spin, count_parts, list_own_steps, make_grid
+from hose_mj.validation.user_hose.refusals import find_obstacle
+
+OWN_MODELS = ("geds", "cable", "flex")
+"""Models that a user's hose is compared with, those of them that there are."""
+REFERENCE_STEP = 2e-3
+"""The first reference takes steps of about this length (s)."""
+MOST_REFERENCE_POINTS = 192
+"""Times `find_fineness`."""
+_TIGHTER = 5.0
+"""A reference is to be this many times closer to its limit than the smallest wanted error."""
+_SHARE_OF_REFERENCE, _SHARE_OF_RUN = 0.3, 0.08
+"""Of the budget: for the references, and for a single run."""
+_GROWTH = 8.0
+"""A rest shape takes a chain of twice as many segments about so many times as long."""
+_EXTRA = 0.1
+"""Of the budget: what timing may take beyond it."""
+_ENOUGH = 2
+"""Resolutions within the smallest wanted error, after which finer ones are left out."""
+
+
+@dataclass
+class OwnStudy:
+    """What was found about a user's hose.
+
+    Attributes:
+        own: the hose.
+        result: all runs, against the hose as it is (`stretchable`).
+        stretch: largest distance between the hose as it is and one that does not stretch, as a
+            fraction of the length: what no inextensible model can get below; None without one.
+        refused: why a model did not run, by model.
+        answers: by wanted error and model.
+        disagreements: by model, and by clamp for the chains.
+    """
+
+    own: OwnHose
+    result: CaseResult
+    stretch: float | None = None
+    refused: dict[str, str] = field(default_factory=dict)
+    answers: list[Answer] = field(default_factory=list)
+    disagreements: list[Disagreement] = field(default_factory=list)
+
+    @property
+    def cut_short(self) -> set[str]:
+        """Models with settings that the budget left out."""
+        return {s.setting.model for s in self.result.skipped if s.why == BUDGET_SPENT}
+
+    @property
+    def checks(self) -> list[Check]:
+        """That the reference is good enough to judge the smallest wanted error."""
+        assert self.result.stretchable is not None
+        text = f"{CASE_ID}: two resolutions of the reference differ by (of L)"
+        return [Check(text, self.result.stretchable.uncertainty, min(self.own.errors) / 2.0)]
+
+    def to_results(self) -> dict[str, list[dict[str, object]]]:
+        """The entries of the document (docs/documents.md) beside those of every comparison."""
+        return {
+            "answers": [asdict(answer) for answer in self.answers],
+            "disagreements": [asdict(gap) for gap in self.disagreements],
+        }
+
+
+def list_own_models() -> tuple[str, ...]:
+    """The models that can be asked for."""
+    return tuple(model for model in OWN_MODELS if model in MODELS)
+
+
+def run_own_study(own: OwnHose, models: Sequence[str], advance: Callable[[str], None]) -> OwnStudy:
+    """Compares the models on a user's hose within about its budget.
+
+    Raises:
+        InputError: GEDS, the reference, cannot run this hose.
+        StepError: GEDS found no rest shape, or could not finish the motion.
+    """
+    obstacle = find_obstacle(own, "geds")
+    if obstacle is not None:
+        raise obstacle
+    case = make_case(own)
+    study = OwnStudy(own, CaseResult(case))
+    for model in models:
+        obstacle = find_obstacle(own, model)
+        if obstacle is not None:
+            study.refused[model] = str(obstacle)
+    running = tuple(model for model in models if model not in study.refused)
+    advance("compiling")
+    _compile(case, make_grid(own))
+    deadline = time.perf_counter() + own.budget
+    _find_references(study, running, advance)
+    if case.motion is None:
+        _run_statics(study, running, deadline, advance)
+    else:
+        _run_motion(study, running, deadline, advance)
+    study.answers = list_answers(study.result.outcomes, running, own.errors)
+    study.disagreements = list_disagreements(study.result.outcomes, own.spec.length)
+    return study
+
+
+def _compile(case: Case, grid: Grid) -> None:
+    """Lays and moves small hoses once, so that compilation is no part of budget and timings."""
+    for scheme in ("bdf2", "bdf2, planar")[: 1 + case.planar]:
+        hose = Setting("geds", scheme, grid.dynamic["geds"][-1], None, SMALLEST_STEP).make(case)
+        holds = case.lay(hose)
+        if case.motion is None:
+            case.probe(hose)
+            return
+        if case.motion.drive is not None:
+            case.motion.drive(hose, holds, SMALLEST_STEP)
+        hose.step(1)
+
+
+def _find_references(
+    study: OwnStudy, models: tuple[str, ...], advance: Callable[[str], None]
+) -> None:
+    """The hose as it is, finer until it is good enough; then one that does not stretch."""
+    own, case = study.own, study.result.case
+    goal = min(own.errors) / _TIGHTER
+    until = time.perf_counter() + own.budget * _SHARE_OF_REFERENCE
+    fineness = find_fineness(own)
+    points, level = fineness * REFERENCE_POINTS * (2 if case.motion is None else 1), 0
+    n_references = 2 if set(models) - {"geds"} else 1
+    while True:
+        advance(f"reference, {points} control points")
+        begun = time.perf_counter()
+        reference = _compute_limit(case, points, level, stretchable=True)
+        now = time.perf_counter()
+        study.result.stretchable = reference
+        # The next one has twice the points and half the steps.
+        if reference.uncertainty <= goal or 2 * points > fineness * MOST_REFERENCE_POINTS:
+            break
+        if now + 4.0 * n_references * (now - begun) > until:
+            break
+        points, level = 2 * points, level + 1
+    if n_references == 2:
+        advance("reference that does not stretch")
+        study.result.inextensible = _compute_limit(case, points, level, stretchable=False)
+        gap = compute_distance(reference.values, study.result.inextensible.values)
+        study.stretch = gap / own.spec.length
+
+
+def _compute_limit(case: Case, points: int, level: int, *, stretchable: bool) -> Reference:
+    if case.motion is not None:
+        parts = count_parts(case.motion.pause, REFERENCE_STEP)
+        steps = 4 * parts * 2**level
+        grid = replace(GRID, reference_steps=(steps, steps))
+        return compute_reference(case, grid, stretchable=stretchable, points=points)
+    if not stretchable:
+        case = stiffen(case)
+    shapes = []
+    for n in (points, 3 * points // 4):
+        hose = Setting("geds", "statics", n).make(case)
+        case.lay(hose)
+        shapes.append(case.probe(hose)[None])
+    assert case.scale is not None
+    return Reference(shapes[0], compute_distance(*shapes) / case.scale)
+
+
+def _run_statics(
+    study: OwnStudy, models: tuple[str, ...], deadline: float, advance: Callable[[str], None]
+) -> None:
+    """Coarse resolutions first; one that would take longer than is left goes by its coarser one."""
+    case, result, grid = study.result.case, study.result, make_grid(study.own)
+    took: dict[tuple[str, bool | None], float] = {}
+    for setting in sorted(list_static(case, models, grid), key=lambda s: _rank(s, grid.static)):
+        kind = (setting.model, setting.clamp_corrected)
+        begun = time.perf_counter()
+        if begun + _GROWTH * took.get(kind, 0.0) > deadline:
+            result.skipped.append(Skipped(CASE_ID, setting, BUDGET_SPENT))
+            continue
+        advance(setting.label)
+        try:
+            result.outcomes.append(score_static(case, setting, result.stretchable))
+        except (InputError, StepError) as error:
+            result.skipped.append(Skipped(CASE_ID, setting, str(error)))
+        took[kind] = time.perf_counter() - begun
+
+
+def _run_motion(
+    study: OwnStudy, models: tuple[str, ...], deadline: float, advance: Callable[[str], None]
+) -> None:
+    """Coarse resolutions of all models first, so that a spent budget leaves out the finest."""
+    own, result = study.own, study.result
+    assert result.stretchable is not None
+    grid = replace(make_grid(own), longest_run=own.budget * _SHARE_OF_RUN)
+    ladders = list(list_ladders(result.case, models, grid, list_own_steps))
+    ladders.sort(key=lambda ladder: _rank(ladder[0], grid.dynamic))
+    fastest = max((spin.fastest for hold in own.holds for spin in hold.spins), default=0.0)
+    for whole in ladders:
+        ladder = [setting for setting in whole if can_spin(setting, fastest)]
+        if not ladder:
+            result.skipped.append(
+                Skipped(CASE_ID, whole[-1], "a clamp turns by half and more in a step")
+            )
+            continue
+        setting = ladder[0]
+        advance(f"{setting.model}, {setting.resolution}")
+        if _count_enough(result.outcomes, setting, min(own.errors)) >= _ENOUGH:
+            why = "coarser ones are within the smallest wanted error"
+            result.skipped.append(Skipped(CASE_ID, setting, why))
+            continue
+        try:
+            setting.make(result.case)
+        except InputError as error:  # segments too light for MuJoCo
+            result.skipped.append(Skipped(CASE_ID, setting, str(error)))
+            continue
+        outcomes, skipped = run_ladder(result.case, ladder, result.stretchable, grid, deadline)
+        result.outcomes += outcomes
+        result.skipped += skipped
+    advance("timing")
+    time_rounds(result.case, result.outcomes, grid, own.errors, deadline + _EXTRA * own.budget)
+
+
+def _rank(setting: Setting, resolutions: Mapping[str, tuple[int, ...]]) -> tuple[bool, int]:
+    """Raw clamps last; else by resolution, with GEDS, which all are held against, one ahead."""
+    place = resolutions[setting.model].index(setting.resolution)
+    return setting.clamp_corrected is False, place - (setting.model == "geds")
+
+
+def _count_enough(outcomes: list[Outcome], like: Setting, error: float) -> int:
+    """Resolutions of one model, scheme and clamp that are within an error."""
+    kind = (like.model, like.scheme, like.clamp_corrected)
+    return len(
+        {
+            o.setting.resolution
+            for o in outcomes
+            if o.error <= error
+            and (o.setting.model, o.setting.scheme, o.setting.clamp_corrected) == kind
+        }
+    )

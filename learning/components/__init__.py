@@ -1,1 +1,0 @@
-"""Parts of the thesis that stand beside the learners, each with a command of its own."""

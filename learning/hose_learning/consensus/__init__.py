@@ -1,0 +1,1 @@
+"""Agents that agree on whose turn it is, by messages."""

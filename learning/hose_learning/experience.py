@@ -1,0 +1,158 @@
+"""`Experience`: logged moves of random agents on any task, with the names of all that is in them.
+
+What learns from a log instead of a running task starts here: the classifiers of chapter 8, and the
+relevance of state variables (Algorithm 5.1).
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hose_learning.experience_kernels import Rows, fill_rows
+from hose_mj.errors import InputError
+from hose_mj.jit import compile_notice
+from hose_mj.recording.files import write_atomically
+from hose_mj.tasks.kernels import Floats, Integers
+from hose_mj.tasks.stream import make_stream
+from hose_mj.tasks.task import Task
+
+Bools = npt.NDArray[np.bool_]
+
+_NAMES = ("variables", "agent_names", "action_names", "event_names", "reward_names")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Experience:
+    """A log of n moves. The arrays are those of `experience_kernels.Rows`.
+
+    Attributes:
+        task: id of the task.
+        variables: names of the columns of `values`, n_variables of them.
+        cardinalities: number of values of each variable (n_variables,).
+        agent_names: by number.
+        action_names: by number.
+        event_names: event k is bit k of `events`.
+        reward_names: names of the columns of `rewards`.
+        violations: the events that break a constraint, as bits.
+        values: what the mover saw before its move (n, n_variables).
+        agents: who moved (n,).
+        actions: its action (n,).
+        events: what the move caused (n,).
+        rewards: what the mover got for it (n, n_signals).
+        next_values: what the mover saw right after its move (n, n_variables).
+    """
+
+    task: str
+    variables: tuple[str, ...]
+    cardinalities: Integers
+    agent_names: tuple[str, ...]
+    action_names: tuple[str, ...]
+    event_names: tuple[str, ...]
+    reward_names: tuple[str, ...]
+    violations: int
+    values: Integers
+    agents: Integers
+    actions: Integers
+    events: Integers
+    rewards: Floats
+    next_values: Integers
+
+    def __len__(self) -> int:
+        return len(self.agents)
+
+    @property
+    def undesired(self) -> Bools:
+        """Whether each move broke a constraint: the class c_1 of chapter 8 (n,)."""
+        broken: Bools = (self.events & self.violations) != 0
+        return broken
+
+    def select(self, agent: int) -> Experience:
+        """Returns the moves of one agent."""
+        own = self.agents == agent
+        return replace(self, **{name: getattr(self, name)[own] for name in Rows._fields})
+
+
+def record_experience(task: Task, n_moves: int, generator: np.random.Generator) -> Experience:
+    """Plays random available actions (epsilon = 1), agents in turn, and logs every move.
+
+    An episode that ends, or reaches the task's step limit, is followed by another one.
+
+    Args:
+        task: compiled or in plain Python.
+        n_moves: moves of single agents.
+        generator: of the actions and the initial states.
+
+    Raises:
+        InputError: fewer than one move.
+    """
+    if n_moves < 1:
+        raise InputError("n_moves", n_moves, "a whole number, at least 1")
+    rows = make_rows(task, n_moves)
+    stream = make_stream(generator)
+    state = task.reset(stream)
+    # A record that is no NamedTuple is a task in plain Python.
+    fill = fill_rows if isinstance(task.kernel, tuple) else fill_rows.py_func
+    with compile_notice("task's kernels"):
+        fill(task.kernel, state, stream, rows)
+    return Experience(
+        task=task.id,
+        variables=tuple(variable.name for variable in task.variables),
+        cardinalities=np.array([variable.cardinality for variable in task.variables], np.int64),
+        agent_names=task.agents,
+        action_names=task.action_names,
+        event_names=task.events,
+        reward_names=task.rewards,
+        violations=int(task.kernel.violations),
+        **rows._asdict(),
+    )
+
+
+def make_rows(task: Task, n_moves: int) -> Rows:
+    """Makes rows of zeros, to be written by `experience_kernels.fill_rows`."""
+    shape = (n_moves, len(task.variables))
+    return Rows(
+        values=np.zeros(shape, np.int64),
+        agents=np.zeros(n_moves, np.int64),
+        actions=np.zeros(n_moves, np.int64),
+        events=np.zeros(n_moves, np.int64),
+        rewards=np.zeros((n_moves, len(task.rewards))),
+        next_values=np.zeros(shape, np.int64),
+    )
+
+
+def write_experience(path: Path, experience: Experience) -> None:
+    """Writes a log as an npz file that holds plain arrays alone."""
+    data = io.BytesIO()
+    entries: dict[str, Any] = {
+        field.name: np.asarray(getattr(experience, field.name)) for field in fields(Experience)
+    }
+    np.savez_compressed(data, **entries)
+    write_atomically(path, data.getvalue())
+
+
+def read_experience(path: Path) -> Experience:
+    """Reads a log.
+
+    Raises:
+        InputError: no such file, or one that `write_experience` did not write.
+    """
+    valid = "a file written by write_experience"
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            entries = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError("experience", str(path), f"{valid} ({error})") from error
+    if set(entries) != {field.name for field in fields(Experience)}:
+        raise InputError("experience", str(path), valid)
+    restored: dict[str, Any] = dict(entries)
+    restored["task"], restored["violations"] = str(entries["task"]), int(entries["violations"])
+    for name in _NAMES:
+        restored[name] = tuple(entries[name].tolist())
+    return Experience(**restored)

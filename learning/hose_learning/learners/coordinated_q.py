@@ -1,0 +1,77 @@
+"""Coordinated reinforcement learning (Guestrin, Lagoudakis and Parr 2002; section 3.6.3).
+
+The team's values are a sum over the edges of a coordination graph, the neighbours along the hose by
+default. All edges learn from the team's one TD error.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hose_learning import rules
+from hose_learning.learner import make_learner
+from hose_learning.learners.coordination import (
+    OPTIONS,
+    add_to_edge,
+    choose_on_graph,
+    get_edge_value,
+    make_coordination,
+    maximize_module,
+)
+from hose_learning.learners.graphs import Graph
+from hose_learning.learners.joint import sum_team_reward
+from hose_learning.learners.round_robin import get_learning_rate
+from hose_learning.records import Learner, Memory
+from hose_learning.settings import LearnerSettings, get_options
+from hose_mj.jit import jitable
+from hose_mj.tasks.task import Task
+
+
+class Coordinated(NamedTuple):
+    """The rule's constants: gamma and the coordination graph."""
+
+    discount: float
+    graph: Graph
+
+
+def make(
+    task: Task, settings: LearnerSettings, generator: np.random.Generator
+) -> tuple[Learner, Memory]:
+    """Makes the learner; see `hose_learning.learner.make_learner`.
+
+    Raises:
+        InputError: a wrong option (see `coordination.OPTIONS`), or settings that a sum over edges
+            does not allow.
+    """
+    graph, scratch = make_coordination(task, settings, get_options(settings, OPTIONS))
+    rule = Coordinated(float(settings.discount), graph)
+    width, n_edges = task.n_actions**2, len(graph.edges)
+    return make_learner(task, settings, rule, generator, scratch, width, n_edges)
+
+
+rules.choose_joint.register(Coordinated)(choose_on_graph)
+
+
+@rules.learn_joint.register(Coordinated)
+@jitable
+def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+    """Moves the values of all edges by the TD error of their sum.
+
+    delta = r + gamma max_a' sum_ij Q_ij(s', a'_i, a'_j) - sum_ij Q_ij(s, a_i, a_j)
+    Q_ij(s, a_i, a_j) <- Q_ij(s, a_i, a_j) + alpha delta, for every edge {i, j}
+    """
+    graph, n_edges = rule.graph, rule.graph.edges.shape[0]
+    for module in range(learner.bases.shape[0]):
+        td_target = sum_team_reward(learner, memory, module)
+        if not is_over:
+            td_target += rule.discount * maximize_module(graph, learner, memory, module)
+        value = 0.0
+        for edge in range(n_edges):
+            value += get_edge_value(graph, learner, memory, edge, module)
+        delta = td_target - value
+        if delta != 0.0:  # rows of zeros that stay so are not stored
+            change = get_learning_rate(learner, memory) * delta
+            for edge in range(n_edges):
+                add_to_edge(graph, learner, memory, edge, module, change)

@@ -1,0 +1,1 @@
+"""Markov decision processes written out, and what the thesis proves of them."""

@@ -1,0 +1,228 @@
+"""Partially constrained models (thesis chapter 7): Definition 11 and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from hose_learning.mdp.explicit_mdp import MarkovModel, evaluate, find_safe_actions, solve
+from hose_mj.errors import InputError
+from hose_mj.tasks.kernels import Floats, Integers
+
+ABSENT = -1
+"""The projection of a target state that the source does not have."""
+PROPERTIES = {
+    1: "each target state projects onto a source state",
+    2: "the transition probabilities are kept",
+    3: "goal and transition states have the same reward",
+    4: "undesired states are as bad in the source, or transition states there",
+}
+Reading = Literal["equal", "signs"]
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A property of Definition 11 that does not hold.
+
+    Attributes:
+        number: 1 to 4, a key of `PROPERTIES`.
+        count: states, or states and actions, at which it does not.
+        state: number of the first such target state.
+        action: the action there; None where the property is about states.
+        source: what the source says there, in words.
+        target: what the target says there.
+    """
+
+    number: int
+    count: int
+    state: int
+    action: int | None
+    source: str
+    target: str
+
+    def __str__(self) -> str:
+        return f"property {self.number} ({PROPERTIES[self.number]}) has exceptions: {self.count}"
+
+
+def find_violations(
+    source: MarkovModel, target: MarkovModel, projection: Integers, reading: Reading = "equal"
+) -> list[Violation]:
+    """Checks Definition 11 in every state and action; no violation means: a PCM.
+
+    Terminal states have no actions, so property 2 is asked of the target's other states. States
+    that are not reached do not exist here, so property 1's S_t = S_s x S_Y is read as: dropping
+    variables takes each target state to a source state. Y may be empty.
+
+    Args:
+        source: the source task.
+        target: the target task, with the same actions.
+        projection: [s], the source state of each target state, or `ABSENT` (n_target_states,).
+        reading: how property 4 compares undesired states: their rewards are "equal", as printed, or
+            only their "signs", as its sentence says (a move that breaks two constraints of which
+            the source has one costs twice as much in the target).
+
+    Raises:
+        InputError: tasks of different actions, or a projection that does not fit them.
+    """
+    if source.actions != target.actions:
+        raise InputError("actions of the target", target.actions, f"the source's, {source.actions}")
+    if projection.shape != (target.n_states,):
+        raise InputError("shape of the projection", projection.shape, f"({target.n_states},)")
+    if projection.min() < ABSENT or projection.max() >= source.n_states:
+        raise InputError("projection", projection.tolist(), f"-1 to {source.n_states - 1}")
+    checks = (
+        _check_states(target, projection),
+        _check_transitions(source, target, projection),
+        *_check_rewards(source, target, projection, reading),
+    )
+    return [violation for violation in checks if violation is not None]
+
+
+def _check_states(target: MarkovModel, projection: Integers) -> Violation | None:
+    """Property 1."""
+    lost = np.flatnonzero(projection == ABSENT)
+    if len(lost) == 0:
+        return None
+    return Violation(1, len(lost), int(lost[0]), None, "no such state", target.names[lost[0]])
+
+
+def _check_transitions(
+    source: MarkovModel, target: MarkovModel, projection: Integers
+) -> Violation | None:
+    """Property 2: sum over [t] = [s'] of P_t(s, a, t) equals P_s([s], a, [s'])."""
+    kept = np.flatnonzero(projection != ABSENT)
+    shape = (target.n_states, source.n_states)
+    onto = csr_array((np.ones(len(kept)), (kept, projection[kept])), shape=shape)
+    asked = kept[~target.terminal[kept]]
+    n_actions = target.n_actions
+    actions = np.arange(n_actions)
+    rows = (asked[:, None] * n_actions + actions).ravel()
+    source_rows = (projection[asked][:, None] * n_actions + actions).ravel()
+    # Rows that lead to a state which the source lacks are what property 1 is about.
+    lost = (target.transitions[rows] @ (projection == ABSENT)) > 0.0
+    difference = abs(target.transitions[rows] @ onto - source.transitions[source_rows])
+    wrong = np.flatnonzero((difference.max(axis=1).toarray().ravel() > TOLERANCE) & ~lost)
+    if len(wrong) == 0:
+        return None
+    state, action = divmod(int(rows[wrong[0]]), n_actions)
+    return Violation(
+        2,
+        len(wrong),
+        state,
+        action,
+        describe_move(source, int(projection[state]), action),
+        describe_move(target, state, action),
+    )
+
+
+def _check_rewards(
+    source: MarkovModel, target: MarkovModel, projection: Integers, reading: Reading
+) -> Iterator[Violation | None]:
+    """Properties 3 and 4: R_t(s) against R_s([s])."""
+    kept = projection != ABSENT
+    in_source = np.where(kept, source.rewards[projection], 0.0)
+    equal = np.abs(target.rewards - in_source) <= TOLERANCE
+    undesired = target.rewards < 0.0
+    as_bad = equal if reading == "equal" else in_source < 0.0
+    for number, asked, holds in (
+        (3, ~undesired, equal),
+        (4, undesired, as_bad | (in_source == 0.0)),
+    ):
+        wrong = np.flatnonzero(kept & asked & ~holds)
+        if len(wrong) == 0:
+            yield None
+            continue
+        state = int(wrong[0])
+        yield Violation(
+            number,
+            len(wrong),
+            state,
+            None,
+            f"{source.names[projection[state]]}: reward {in_source[state]:g}",
+            f"{target.names[state]}: reward {target.rewards[state]:g}",
+        )
+
+
+def describe_move(model: MarkovModel, state: int, action: int) -> str:
+    """Returns a move in words: the state, the action, and where it leads with which probability."""
+    row = model.transitions[[state * model.n_actions + action]]
+    ends = [
+        model.names[column] + ("" if p == 1.0 else f" with probability {p:g}")
+        for column, p in zip(row.indices, row.data, strict=True)
+    ]
+    leads_to = " or ".join(ends) if ends else "the end of the episode, before this move"
+    return f"{model.names[state]} -- {model.actions[action]} -> {leads_to}"
+
+
+@dataclass(frozen=True, eq=False)
+class Propositions:
+    """What chapter 7 concludes, measured on one pair of tasks, in the target's n states.
+
+    Attributes:
+        unsafe_in_source: actions that are safe in the target and not in the source; Proposition 4
+            says that there are none.
+        bounds: max_a Q_s*([s], a) (n,).
+        best: V_t*(s) (n,).
+        greedy: V of the greedy policy among the target's safe actions, transferred by equations 7.1
+            and 7.2 (n,).
+    """
+
+    unsafe_in_source: int
+    bounds: Floats
+    best: Floats
+    greedy: Floats
+
+    @property
+    def excess(self) -> float:
+        """Largest V_t*(s) - max_a Q_s*([s], a); the corrected Proposition 5: at most 0.
+
+        It is so if a PCM's source is worth nothing less than 0 wherever the target's episode ends.
+        """
+        return float((self.best - self.bounds).max())
+
+    @property
+    def shortfall(self) -> float:
+        """Largest V_t*(s) - V_t^g(s); 0 is what Proposition 5 as printed claims.
+
+        It cannot be negative, as no policy has more than V_t*.
+        """
+        return float((self.best - self.greedy).max())
+
+    @property
+    def shortfall_state(self) -> int:
+        """The target state of the largest shortfall."""
+        return int((self.best - self.greedy).argmax())
+
+
+def compute_propositions(
+    source: MarkovModel, target: MarkovModel, projection: Integers, discount: float = 0.9
+) -> Propositions:
+    """Measures Propositions 4 and 5 on a pair of tasks.
+
+    Args:
+        source: the source task.
+        target: the target task.
+        projection: [s] of each target state, none of them `ABSENT`.
+        discount: gamma.
+    """
+    safe = find_safe_actions(target)
+    unsafe_in_source = safe & ~find_safe_actions(source)[projection]
+    transferred = solve(source, discount)[projection]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
+    return Propositions(
+        unsafe_in_source=int(unsafe_in_source.sum()),
+        # Nothing follows on a terminal state of the target, whatever does in the source.
+        bounds=np.where(target.terminal, 0.0, transferred.max(axis=1)),
+        best=solve(target, discount).max(axis=1),
+        greedy=evaluate(target, choose_greedy(transferred, safe), discount),
+    )
+
+
+def choose_greedy(q_values: Floats, allowed: np.ndarray) -> Integers:
+    """Returns the best allowed action of each state, the first of equals; any if none is."""
+    masked = np.where(allowed, q_values, -np.inf)
+    return np.asarray(np.where(allowed.any(axis=1), masked.argmax(axis=1), q_values.argmax(axis=1)))

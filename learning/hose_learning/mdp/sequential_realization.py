@@ -1,0 +1,216 @@
+"""Sequential realizations (thesis section 6.4): are moves in turn joint moves of one agent?
+
+A cooperative game in turns realizes a game of joint moves if a joint action a_i, in which every
+agent but the i-th is idle, does what agent i's action a_i does alone (Definition 10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hose_learning.mdp.explicit_mdp import describe_state
+from hose_mj.errors import InputError
+from hose_mj.tasks import kernels
+from hose_mj.tasks.exact import enumerate_joint, enumerate_turns
+from hose_mj.tasks.kernels import HEADER, TURN, Floats, Integers
+from hose_mj.tasks.task import Task
+
+Sharing = Literal["team", "each"]
+PROPERTIES = {
+    1: "the transitions are the same",
+    2: "the rewards are the same",
+    3: "the episode ends alike",
+}
+"""Definition 10's two, and the one that its terminal states imply."""
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A property of Definition 10 that does not hold.
+
+    Attributes:
+        number: a key of `PROPERTIES`.
+        count: states, agents and actions for which it does not.
+        state: the first such state, in words.
+        agent: name of the agent that acts.
+        action: name of its action.
+        alone: what comes of the action alone.
+        jointly: what comes of the joint action in which it alone is not idle.
+    """
+
+    number: int
+    count: int
+    state: str
+    agent: str
+    action: str
+    alone: str
+    jointly: str
+
+    def __str__(self) -> str:
+        return f"property {self.number} ({PROPERTIES[self.number]}) has exceptions: {self.count}"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a move: the task's own part of the state, events, rewards, the end."""
+
+    state: Integers
+    events: int
+    rewards: Floats
+    over: bool
+
+
+@dataclass(frozen=True)
+class SequentialStudy:
+    """What was compared.
+
+    Attributes:
+        n_states: states, whosever turn it is.
+        n_moves: states times agents times actions.
+        violations: the properties that do not hold.
+    """
+
+    n_states: int
+    n_moves: int
+    violations: tuple[Violation, ...]
+
+
+def study_sequential(
+    task: Task,
+    starts: Iterable[Integers],
+    idle: str = "none",
+    sharing: Sharing = "team",
+    limit: int = 10**5,
+) -> SequentialStudy:
+    """Checks Definition 10 for every agent and action in every state that can be reached.
+
+    States are those that moves in turn or joint moves reach, with the turn given to the agent that
+    acts: Definition 10 asks of all agents in all states.
+
+    Args:
+        task: a task whose agents move in turn, or jointly.
+        starts: initial states.
+        idle: name of the action that stands for none.
+        sharing: whether R is the "team"'s, the worth of all that happened, counted once (Definition
+            9 has one scalar for all), or what "each" agent gets, compared agent by agent.
+        limit: largest number of states.
+
+    Raises:
+        InputError: a single agent, no such action, or more states than the limit.
+    """
+    if task.schedule != "turns":
+        raise InputError("task", task.id, "one whose agents move in turn")
+    if idle not in task.action_names:
+        raise InputError("idle action", idle, "one of " + ", ".join(task.action_names))
+    states = _list_states(task, list(starts), limit)
+    nothing = task.action_names.index(idle)
+    found: dict[int, list[tuple[Integers, int, int]]] = {number: [] for number in PROPERTIES}
+    for state in states:
+        for agent in range(task.n_agents):
+            for action in range(task.n_actions):
+                alone = move_alone(task, state, agent, action, sharing)
+                jointly = move_jointly(task, state, agent, action, nothing, sharing)
+                for number in compare(alone, jointly):
+                    found[number].append((state, agent, action))
+    violations = tuple(
+        _make_violation(task, number, moves, nothing, sharing)
+        for number, moves in found.items()
+        if moves
+    )
+    return SequentialStudy(len(states), len(states) * task.n_agents * task.n_actions, violations)
+
+
+def _list_states(task: Task, starts: list[Integers], limit: int) -> list[Integers]:
+    """Returns the states that moves in turn or joint moves reach, all with the turn of agent 0."""
+    seen: dict[bytes, Integers] = {}
+    for enumerate_moves in (enumerate_turns, enumerate_joint):
+        for state in enumerate_moves(task, starts, limit).states:
+            plain = state.copy()
+            plain[TURN] = 0
+            seen.setdefault(plain.tobytes(), plain)
+    return list(seen.values())
+
+
+def move_alone(task: Task, state: Integers, agent: int, action: int, sharing: Sharing) -> Outcome:
+    """Returns P(s, a_i, .) and R(s, a_i, .): the agent acts in its turn."""
+    after = state.copy()
+    after[TURN] = agent
+    events = int(kernels.apply(task.kernel, after, agent, action))
+    rewards = np.zeros(len(task.rewards))
+    got = []
+    for other in range(task.n_agents):
+        kernels.compute_rewards(task.kernel, events, agent, other, rewards)
+        got.append(rewards.sum())
+    return _make_outcome(task, after, events, got, sharing)
+
+
+def move_jointly(
+    task: Task, state: Integers, agent: int, action: int, idle: int, sharing: Sharing
+) -> Outcome:
+    """Returns **P**(s, a_i, .) and **R**(s, a_i, .): all others are idle."""
+    after = state.copy()
+    actions = np.full(task.n_agents, idle)
+    actions[agent] = action
+    charged = np.zeros(task.n_agents, np.int64)
+    events = int(kernels.apply_joint(task.kernel, after, actions, charged))
+    rewards = np.zeros(len(task.rewards))
+    got = []
+    for other in range(task.n_agents):
+        kernels.compute_joint_rewards(task.kernel, charged, other, rewards)
+        got.append(rewards.sum())
+    return _make_outcome(task, after, events, got, sharing)
+
+
+def _make_outcome(
+    task: Task, after: Integers, events: int, got: list[float], sharing: Sharing
+) -> Outcome:
+    if sharing == "team":
+        worth = np.zeros(len(task.rewards))
+        kernels.compute_rewards(task.kernel, events, 0, 0, worth)
+        got = [worth.sum()]
+    over = bool(kernels.is_over(task.kernel, events))
+    return Outcome(after, events, np.array(got), over)
+
+
+def compare(alone: Outcome, jointly: Outcome) -> list[int]:
+    """Returns the numbers of the properties in which two outcomes differ."""
+    holds = {
+        1: (alone.state[HEADER:] == jointly.state[HEADER:]).all(),
+        2: np.abs(alone.rewards - jointly.rewards).max() <= TOLERANCE,
+        3: alone.over == jointly.over,
+    }
+    return [number for number, same in holds.items() if not same]
+
+
+def _make_violation(
+    task: Task,
+    number: int,
+    moves: list[tuple[Integers, int, int]],
+    idle: int,
+    sharing: Sharing,
+) -> Violation:
+    state, agent, action = moves[0]
+    alone = move_alone(task, state, agent, action, sharing)
+    jointly = move_jointly(task, state, agent, action, idle, sharing)
+    shown = state.copy()
+    shown[TURN] = agent
+    return Violation(
+        number,
+        len(moves),
+        describe_state(task, shown),
+        task.agents[agent],
+        task.action_names[action],
+        _describe(task, alone),
+        _describe(task, jointly),
+    )
+
+
+def _describe(task: Task, outcome: Outcome) -> str:
+    rewards = ", ".join(f"{reward:g}" for reward in outcome.rewards)
+    after = describe_state(task, outcome.state, outcome.events)
+    return f"{after}; rewards {rewards}" + "; the end" * outcome.over

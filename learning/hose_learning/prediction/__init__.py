@@ -1,0 +1,1 @@
+"""Classifiers that predict which moves break a constraint."""

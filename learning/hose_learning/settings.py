@@ -1,0 +1,118 @@
+"""All settings of a learner as data: what a run is identified by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from hose_learning.mediators import MEDIATORS
+from hose_learning.modules import Module
+from hose_mj.errors import InputError
+
+POLICIES = ("epsilon-greedy", "soft-max")
+FALLBACKS = ("none", "any")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exploration:
+    """How much is left to chance, and how that falls.
+
+    Attributes:
+        epsilon: at the start.
+        least: what it does not fall below.
+        per_episode: what it falls by after each episode.
+        per_success: what it falls by after each episode that reached the goal.
+        policy: "epsilon-greedy" (eq. 3.6) or "soft-max" (eq. 3.5) at a temperature of
+            `temperature_factor` times epsilon.
+        temperature_factor: see there.
+
+    Raises:
+        InputError: a value outside its range.
+    """
+
+    epsilon: float = 1.0
+    least: float = 0.0
+    per_episode: float = 0.0
+    per_success: float = 0.0
+    policy: str = "epsilon-greedy"
+    temperature_factor: float = 10.0
+
+    def __post_init__(self) -> None:
+        check_range("epsilon", self.epsilon, 0.0, 1.0)
+        check_range("least", self.least, 0.0, self.epsilon)
+        check_range("per_episode", self.per_episode, 0.0, 1.0)
+        check_range("per_success", self.per_success, 0.0, 1.0)
+        check_range("temperature_factor", self.temperature_factor, 0.0, 1e9)
+        if self.policy not in POLICIES:
+            raise InputError("policy", self.policy, "one of " + ", ".join(POLICIES))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnerSettings:
+    """A learner as data.
+
+    Attributes:
+        modules: what it sees and learns from; at least one value module.
+        discount: gamma.
+        learning_rate: alpha at the start.
+        learning_rate_decay: alpha / (1 + decay moves).
+        exploration: epsilon and how it falls.
+        mediator: how several value modules agree, a key of `mediators.MEDIATORS`.
+        share_vetoes: whether a broken constraint vetoes the last move of every agent of the cycle,
+            and not of the mover alone.
+        fallback: what is done where everything is vetoed: the action "none" where there is one, or
+            "any".
+        hashed: whether tables are hashed; None for what fits.
+        options: what only this learner's rule knows (see its file).
+
+    Raises:
+        InputError: a value outside its range.
+    """
+
+    modules: tuple[Module, ...]
+    discount: float = 0.9
+    learning_rate: float = 0.25
+    learning_rate_decay: float = 0.0
+    exploration: Exploration = field(default_factory=Exploration)
+    mediator: str = "greatest-mass"
+    share_vetoes: bool = False
+    fallback: str = "none"
+    hashed: bool | None = None
+    options: Mapping[str, float | str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_range("discount", self.discount, 0.0, 1.0)
+        check_range("learning_rate", self.learning_rate, 0.0, 1.0)
+        check_range("learning_rate_decay", self.learning_rate_decay, 0.0, 1e9)
+        if self.mediator not in MEDIATORS:
+            raise InputError("mediator", self.mediator, "one of " + ", ".join(MEDIATORS))
+        if self.fallback not in FALLBACKS:
+            raise InputError("fallback", self.fallback, "one of " + ", ".join(FALLBACKS))
+        if not any(module.kind == "value" for module in self.modules):
+            names = [module.name for module in self.modules]
+            raise InputError("modules", names, "at least one value module")
+
+
+def check_range(name: str, value: object, low: float, high: float) -> None:
+    """Raises `InputError` unless the value is a number from `low` to `high`."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not low <= value <= high:  # type: ignore[operator]
+        raise InputError(name, value, f"a number from {low:g} to {high:g}")
+
+
+def get_options(
+    settings: LearnerSettings, defaults: Mapping[str, float | str]
+) -> dict[str, float | str]:
+    """Returns a rule's own options, the defaults where none are given.
+
+    Raises:
+        InputError: an unknown option, or text where a number belongs or the other way round.
+    """
+    for name, value in settings.options.items():
+        if name not in defaults:
+            known = ", ".join(defaults) or "none: this learner has no options of its own"
+            raise InputError("learner's option", name, f"one of {known}")
+        if isinstance(value, str) != isinstance(defaults[name], str):
+            kind = "a word" if isinstance(defaults[name], str) else "a number"
+            raise InputError(name, value, kind)
+    return {**defaults, **settings.options}

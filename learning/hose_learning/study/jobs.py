@@ -1,0 +1,155 @@
+"""Jobs: single training runs as data, done by several processes and kept by their hash.
+
+What a job gives depends on nothing but the job, so the order of the workers does not matter.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hose_learning.learners import catalog
+from hose_learning.settings import Exploration
+from hose_learning.study.measures import measure
+from hose_learning.study.training import Training
+from hose_mj.recording.files import write_atomically
+from hose_mj.tasks.registry import make_task
+
+VERSION = 1
+"""Raised when the same job would give something else than before."""
+Result = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One training run.
+
+    Attributes:
+        name: what it is a run of; runs of one name differ in seed or configuration alone.
+        task: id of the task.
+        options: the task's options.
+        learner: id of the learner.
+        settings: arguments of `catalog.make_settings`; those of `Exploration` under
+            "exploration".
+        seed: seeds everything that is left to chance.
+        episodes: most episodes.
+        steps: most training steps (`measures.measure`).
+        test_every: episodes between two greedy tests; 0 tests once, at the end.
+    """
+
+    name: str
+    task: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    learner: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seed: int
+    episodes: int | None = None
+    steps: int | None = None
+    test_every: int = 0
+
+    @property
+    def identity(self) -> str:
+        """Returns a hash of all that the job is."""
+        text = json.dumps([VERSION, dataclasses.asdict(self)], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+def make_training(job: Job) -> Training:
+    """Makes the training that a job describes, before its first move."""
+    task = make_task(job.task, **job.options)
+    settings = dict(job.settings)
+    if "exploration" in settings:
+        settings["exploration"] = Exploration(**settings["exploration"])
+    made = catalog.make_settings(job.learner, task, **settings)
+    return Training(task, job.learner, made, np.random.default_rng(job.seed))
+
+
+def do(job: Job) -> Result:
+    """Does a job.
+
+    Returns:
+        With `test_every`, the fields of `Measures`. Without, `success_rate` of the last tenth of
+        the episodes, the `test_success` and `test_moves` of a greedy test at the end, and `moves`.
+    """
+    training = make_training(job)
+    if job.test_every:
+        most = 2**62 if job.steps is None else job.steps
+        return dataclasses.asdict(measure(training, most, job.episodes, job.test_every))
+    ended = training.advance(moves=job.steps, episodes=job.episodes)
+    last = ended.find_successes(training.task)[-max(1, len(ended) // 10) :]
+    test = training.test(1)
+    return {
+        "success_rate": float(last.mean()),
+        "test_success": bool(test.find_successes(training.task)[0]),
+        "test_moves": int(test.moves[0]),
+        "moves": training.moves,
+    }
+
+
+def do_all(
+    jobs: Sequence[Job],
+    n_workers: int,
+    folder: Path | None = None,
+    done: Callable[[int], None] = lambda amount: None,
+) -> list[Result]:
+    """Does jobs in several processes and returns their results in the order of the jobs.
+
+    Args:
+        jobs: the jobs.
+        n_workers: number of processes; 1 works in this one.
+        folder: results are kept here, one file each, and found again; None keeps nothing.
+        done: called with 1 for each job that is done.
+    """
+    results: dict[str, Result] = {}
+    for job in jobs:
+        kept = _find(job, folder)
+        if kept is not None:
+            results[job.identity] = kept
+            done(1)
+    missing = list({j.identity: j for j in jobs if j.identity not in results}.values())
+    for job, result in _work(missing, n_workers):
+        results[job.identity] = result
+        if folder is not None:
+            kept = {"job": dataclasses.asdict(job), "result": result}
+            write_atomically(_place(job, folder), json.dumps(kept, indent=1).encode())
+        done(1)
+    return [results[job.identity] for job in jobs]
+
+
+def _work(jobs: Sequence[Job], n_workers: int) -> Iterator[tuple[Job, Result]]:
+    if n_workers <= 1 or len(jobs) <= 1:
+        yield from ((job, do(job)) for job in jobs)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(n_workers, mp_context=context) as pool:
+        futures = {pool.submit(do, job): job for job in jobs}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _place(job: Job, folder: Path) -> Path:
+    return folder / f"{job.identity}.json"
+
+
+def _find(job: Job, folder: Path | None) -> Result | None:
+    """Returns a result that was kept, or None; a damaged file counts as none."""
+    if folder is None or not _place(job, folder).is_file():
+        return None
+    try:
+        result = json.loads(_place(job, folder).read_bytes())["result"]
+    except (ValueError, KeyError, TypeError):
+        return None
+    return result if isinstance(result, dict) else None

@@ -1,0 +1,1 @@
+"""Starting on a task from what was learned on a simpler one."""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
+from hose_mj.tasks.line import kernels as line_kernels
 from hose_mj.tasks.line.settings import DIRECTIONS
-from hose_mj.tasks.line.settings import kernels as line_kernels
 from hose_mj.world.actions import STEPS, Actions, find_cells, find_centres
 from hose_mj.world.driving import Driver
 from hose_mj.world.registry import make_world

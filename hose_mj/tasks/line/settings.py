@@ -12,6 +12,10 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.tasks.checks import check_cell, check_cells, check_choice, check_finite, check_integer
 from hose_mj.tasks.kernels import HEADER, Integers
+from hose_mj.tasks.line import kernels as rules
+
+# The first two are imported for what they register.
+from hose_mj.tasks.line import starts as line_starts
 from hose_mj.tasks.line.geometry import (
     LARGEST_REACH,
     N_DIRECTIONS,
@@ -21,10 +25,6 @@ from hose_mj.tasks.line.geometry import (
     make_distance_table,
     make_offset_table,
 )
-from hose_mj.tasks.line.settings import kernels as rules
-
-# The first two are imported for what they register.
-from hose_mj.tasks.line.settings import starts as line_starts
 from hose_mj.tasks.task import Task, make_reward_table
 from hose_mj.tasks.variables import Variable
 

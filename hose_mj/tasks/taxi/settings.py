@@ -11,7 +11,7 @@ from hose_mj.errors import InputError
 from hose_mj.tasks.checks import check_cells, check_choice, check_finite, check_integer
 from hose_mj.tasks.kernels import HEADER, Integers
 from hose_mj.tasks.task import Task, make_reward_table
-from hose_mj.tasks.taxi.settings import kernels as rules
+from hose_mj.tasks.taxi import kernels as rules
 from hose_mj.tasks.variables import Variable
 
 Cell = tuple[int, int]

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hose_mj.recording.plots.api import api as plots
+from hose_mj.recording.plots import api as plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.report.obstacles import find_outlines
 from hose_mj.validation.run import Outcome

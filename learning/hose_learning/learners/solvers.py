@@ -3,8 +3,9 @@
 A graph has a payoff f_ij(a_i, a_j) on each edge; wanted are the actions with the highest sum. Each
 agent is restricted to what it may do, given as bits.
 
-All work on a `Graph` (graphs.py) and a `Scratch` (coordination.py), whose `values` begin with the payoffs of the edges. `maximize` is compiled for itself, so that it is found
-on disk by every learner and task.
+All work on a `Graph` (graphs.py) and a `Scratch` (coordination.py), whose `values` begin
+with the payoffs of the edges. `maximize` is compiled for itself, so that it is found on disk by
+every learner and task.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.recording.plots.api import api as plots
+from hose_mj.recording.plots import api as plots
 from hose_mj.recording.plots.axes import format_percent, format_seconds
 from hose_mj.recording.plots.labels import Label, label_points, spread_apart
 from hose_mj.recording.plots.palette import COLORS, find_model, lighten, name_model

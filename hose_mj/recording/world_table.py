@@ -30,21 +30,21 @@ def write_csv(path: Path, episode: WorldEpisode) -> None:
 
 def make_columns(episode: WorldEpisode) -> dict[str, Any]:
     """Returns the columns by name, in order."""
-    stage, samples = episode.stage, episode.samples
+    scene, samples = episode.scene, episode.samples
     rows = samples.rows
     columns: dict[str, Any] = {"time_s": samples.times}
     if samples.has_turns:
         columns["turn"] = pa.array(rows["turn"], mask=rows["turn"] == NO_TURN)
     columns |= {"owner": samples.owners, "vetoed": samples.vetoed, "events": samples.events}
     columns["reward"] = rows["reward"]
-    for i, name in enumerate((*stage.robots, "source")):
+    for i, name in enumerate((*scene.robots, "source")):
         for k, axis in enumerate(_AXES):
             columns[f"{name} {axis}_m"] = rows["attachments"][:, i, k]
         for k, axis in enumerate(_AXES):
             columns[f"{name} force_{axis}_N"] = rows["forces"][:, i, k]
     columns["tension_min_N"] = rows["tension"].min(axis=1)
     columns["tension_max_N"] = rows["tension"].max(axis=1)
-    for i, margin in enumerate(stage.margins):
+    for i, margin in enumerate(scene.margins):
         values = rows["margins"][:, i]
         columns[f"margin {margin.name}_{margin.unit}"] = pa.array(values, mask=np.isnan(values))
     return {

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
-from hose_mj.recording.stage import Geom, Margin, Stage
+from hose_mj.recording.scene_description import Geom, Margin, SceneDescription
 from hose_mj.recording.tension import color_tension
 from hose_mj.recording.world_episode import BreakMark, SampleBuffer
 
@@ -19,14 +19,14 @@ def make_geom(**changed):
 
 def make_stage(**changed):
     values = {
-        "name": "geds", "title": "A stage", "geoms": (make_geom(),), "bodies": ("puck",),
+        "name": "geds", "title": "A scene", "geoms": (make_geom(),), "bodies": ("puck",),
         "robots": ("robot0",), "goal": make_geom(name="goal", body=-1), "arc_lengths": [0, 0.5, 1],
         "hose_radius": 0.01, "tension_limit": 10.0,
         "margins": (Margin("stretch 0", "stretch", "N"),),
         "n_control_points": 4, "low": [0, 0, 0], "high": [1, 1, 0.1], "source": [0, 0, 0],
         "bounds": [[0, 0, -np.inf], [1, 1, np.inf]],
     }  # fmt: skip
-    return Stage(**(values | changed))
+    return SceneDescription(**(values | changed))
 
 
 @pytest.mark.parametrize(

@@ -15,10 +15,10 @@ from hose_mj.recording.rerun.parts import APPLICATION_ID
 from hose_mj.recording.rerun.world_blueprint import make_world_blueprint
 from hose_mj.recording.rerun.world_files import RecordingFile, describe_ending, open_log
 from hose_mj.recording.rerun.world_stage import log_settings
+from hose_mj.recording.scene_description import SceneDescription
 from hose_mj.recording.sinks import Background, Sink
-from hose_mj.recording.stage import Stage
 from hose_mj.recording.viewer import open_window
-from hose_mj.recording.world_episode import Outcome, Samples
+from hose_mj.recording.world_episode import EpisodeEnding, Samples
 
 _STRETCH_S = 30.0
 """How long a viewer may take for one stretch before the rest is kept from it (s)."""
@@ -78,28 +78,28 @@ class LiveView:
     def __init__(self, url: str, recording_id: str | None = None, wait_s: float = 0.5) -> None:
         self._url, self._id, self._wait = url, recording_id, wait_s
 
-    def begin(self, stage: Stage) -> None:
-        """Connects and shows the stage.
+    def begin(self, scene: SceneDescription) -> None:
+        """Connects and shows the scene.
 
         Raises:
             HoseError: nobody listens.
         """
         wait_for(self._url, self._wait)
-        self._stage = stage
+        self._scene = scene
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)
         self._stream.connect_grpc(self._url)
-        self._stream.send_blueprint(make_world_blueprint([stage], follow=True))
-        self._log = open_log(self._stream, stage)
+        self._stream.send_blueprint(make_world_blueprint([scene], follow=True))
+        self._log = open_log(self._stream, scene)
 
     def add(self, samples: Samples) -> None:
         """Sends a stretch."""
         self._log.add(samples)
         self._stream.flush(timeout_sec=_STRETCH_S)
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, ending: EpisodeEnding) -> None:
         """Sends how it ended."""
-        self._log.end(outcome)
-        log_settings(self._stream, [self._stage], [describe_ending(self._stage, outcome)])
+        self._log.end(ending)
+        log_settings(self._stream, [self._scene], [describe_ending(self._scene, ending)])
         self._stream.flush(timeout_sec=_STRETCH_S)
         self._stream.disconnect()
 

@@ -14,8 +14,8 @@ from hose_mj.recording.rerun.parts import APPLICATION_ID
 from hose_mj.recording.rerun.world_blueprint import make_world_blueprint
 from hose_mj.recording.rerun.world_log import WorldLog
 from hose_mj.recording.rerun.world_stage import choose_look, log_scene, log_settings
-from hose_mj.recording.stage import Stage
-from hose_mj.recording.world_episode import Outcome, Samples, WorldEpisode
+from hose_mj.recording.scene_description import SceneDescription
+from hose_mj.recording.world_episode import EpisodeEnding, Samples, WorldEpisode
 
 
 def write_world_recording(
@@ -26,7 +26,7 @@ def write_world_recording(
     Args:
         path: replaced if it exists.
         episodes: the first in its own colours, the others tinted and see-through; names of their
-            stages all different.
+            scenes all different.
         recording_id: tells recordings apart in the viewer; a new one by default.
 
     Raises:
@@ -34,18 +34,18 @@ def write_world_recording(
     """
     if not episodes:
         raise InputError("episodes", episodes, "at least one")
-    stages = [episode.stage for episode in episodes]
-    check_unique("episodes", [stage.name for stage in stages])
+    scenes = [episode.scene for episode in episodes]
+    check_unique("episodes", [scene.name for scene in scenes])
     temp = make_temp_beside(Path(path))
     try:
         stream = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
-        stream.save(temp, default_blueprint=make_world_blueprint(stages))
-        log_settings(stream, stages, [describe_ending(e.stage, e.outcome) for e in episodes])
-        log_scene(stream, stages[0])
+        stream.save(temp, default_blueprint=make_world_blueprint(scenes))
+        log_settings(stream, scenes, [describe_ending(e.scene, e.ending) for e in episodes])
+        log_scene(stream, scenes[0])
         for rank, episode in enumerate(episodes):
-            log = WorldLog(stream, episode.stage, choose_look(rank))
+            log = WorldLog(stream, episode.scene, choose_look(rank))
             log.add(episode.samples)
-            log.end(episode.outcome)
+            log.end(episode.ending)
         stream.flush()
         stream.disconnect()
         replace_atomically(temp, Path(path))
@@ -64,35 +64,35 @@ class RecordingFile:
     def __init__(self, path: Path, recording_id: str | None = None) -> None:
         self._path, self._id = Path(path), recording_id
 
-    def begin(self, stage: Stage) -> None:
+    def begin(self, scene: SceneDescription) -> None:
         """Opens the file, under another name as yet."""
         self._temp = make_temp_beside(self._path)
-        self._stage = stage
+        self._scene = scene
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)
-        self._stream.save(self._temp, default_blueprint=make_world_blueprint([stage]))
-        self._log = open_log(self._stream, stage)
+        self._stream.save(self._temp, default_blueprint=make_world_blueprint([scene]))
+        self._log = open_log(self._stream, scene)
 
     def add(self, samples: Samples) -> None:
         """Writes a stretch."""
         self._log.add(samples)
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, ending: EpisodeEnding) -> None:
         """Writes how it ended, and puts the file in its place."""
-        self._log.end(outcome)
-        log_settings(self._stream, [self._stage], [describe_ending(self._stage, outcome)])
+        self._log.end(ending)
+        log_settings(self._stream, [self._scene], [describe_ending(self._scene, ending)])
         self._stream.flush()
         self._stream.disconnect()
         replace_atomically(self._temp, self._path)
 
 
-def describe_ending(stage: Stage, outcome: Outcome) -> str:
+def describe_ending(scene: SceneDescription, ending: EpisodeEnding) -> str:
     """Returns one Markdown line on how an episode ended."""
-    ending = f"**{stage.name}: {outcome.ended_by}**"
-    return ending if outcome.mark is None else f"{ending}. {outcome.mark.text}"
+    line = f"**{scene.name}: {ending.ended_by}**"
+    return line if ending.mark is None else f"{line}. {ending.mark.text}"
 
 
-def open_log(stream: rr.RecordingStream, stage: Stage) -> WorldLog:
+def open_log(stream: rr.RecordingStream, scene: SceneDescription) -> WorldLog:
     """Logs what stands still and returns the log of what moves."""
-    log_settings(stream, [stage])
-    log_scene(stream, stage)
-    return WorldLog(stream, stage, choose_look(0))
+    log_settings(stream, [scene])
+    log_scene(stream, scene)
+    return WorldLog(stream, scene, choose_look(0))

@@ -1,4 +1,4 @@
-"""The stage of an episode as Rerun entities: geoms, goal, bounds, the scale of the tension."""
+"""The scene of an episode as Rerun entities: geoms, goal, bounds, the scale of the tension."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hose_mj.recording.captions import format_table
 from hose_mj.recording.episode import Array
 from hose_mj.recording.plots.palette import Rgb, mix
 from hose_mj.recording.rerun.parts import log_document
-from hose_mj.recording.stage import WORLD, Geom, Rgba, Stage
+from hose_mj.recording.scene_description import WORLD, Geom, Rgba, SceneDescription
 from hose_mj.recording.tension import make_scale
 
 SCENE = "world/scene"
@@ -24,9 +24,9 @@ TINTS: tuple[Rgb, ...] = ((255, 255, 255), (0, 190, 170), (225, 110, 200), (110,
 BOUNDS_COLOR = (150, 165, 185)
 CELL_COLOR = (120, 132, 148)
 _LONGEST_ARROW = 0.3
-"""Of the stage's size: forces that want longer arrows are cut."""
+"""Of the scene's size: forces that want longer arrows are cut."""
 _PLANE_THICKNESS = 0.004
-"""Of the stage's size: a plane is drawn as a thin box whose top it is."""
+"""Of the scene's size: a plane is drawn as a thin box whose top it is."""
 
 
 @dataclass(frozen=True)
@@ -53,74 +53,78 @@ def choose_look(rank: int) -> Look:
     return Look(rank, TINTS[rank % len(TINTS)])
 
 
-def path_of(stage: Stage, *parts: str) -> str:
+def path_of(scene: SceneDescription, *parts: str) -> str:
     """Returns the entity path of what belongs to one episode's part of the world."""
-    return "/".join(["world", *map(rr.escape_entity_path_part, (stage.name, *parts))])
+    return "/".join(["world", *map(rr.escape_entity_path_part, (scene.name, *parts))])
 
 
-def log_scene(stream: rr.RecordingStream, stage: Stage) -> None:
+def log_scene(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     """Logs what stands still, once for all overlaid episodes."""
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for geom in stage.geoms:
+    for geom in scene.geoms:
         if geom.body == WORLD:
-            log_geom(stream, f"{SCENE}/{rr.escape_entity_path_part(geom.name)}", geom, stage)
-    _log_goal(stream, stage)
-    _log_bounds(stream, stage)
-    _log_cells(stream, stage)
-    _log_scale(stream, stage)
+            log_geom(stream, f"{SCENE}/{rr.escape_entity_path_part(geom.name)}", geom, scene)
+    _log_goal(stream, scene)
+    _log_bounds(stream, scene)
+    _log_cells(stream, scene)
+    _log_scale(stream, scene)
 
 
-def log_robots(stream: rr.RecordingStream, stage: Stage, look: Look) -> None:
+def log_robots(stream: rr.RecordingStream, scene: SceneDescription, look: Look) -> None:
     """Logs the shapes of the bodies that move, under the entities that their poses go to."""
-    for geom in stage.geoms:
+    for geom in scene.geoms:
         if geom.body != WORLD:
-            path = path_of(stage, "robots", stage.bodies[geom.body], geom.name)
-            log_geom(stream, path, geom, stage, look)
+            path = path_of(scene, "robots", scene.bodies[geom.body], geom.name)
+            log_geom(stream, path, geom, scene, look)
 
 
 def log_settings(
-    stream: rr.RecordingStream, stages: Sequence[Stage], endings: Sequence[str] = ()
+    stream: rr.RecordingStream, scenes: Sequence[SceneDescription], endings: Sequence[str] = ()
 ) -> None:
     """Logs how the episodes ended, their settings and what the picture's colours mean."""
-    lines = [f"# {stages[0].title}", *endings]
-    for stage in stages:
-        scale = 10.0 ** np.floor(np.log10(stage.tension_limit))
+    lines = [f"# {scenes[0].title}", *endings]
+    for scene in scenes:
+        scale = 10.0 ** np.floor(np.log10(scene.tension_limit))
         shown = {
-            "red hose": f"{stage.tension_limit:.4g} N",
-            "violet arrow": f"force, {scale * force_scale(stage):.3g} m for {scale:g} N",
-            "longest arrow": f"from {_LONGEST_ARROW * stage.size / force_scale(stage):.3g} N on",
+            "red hose": f"{scene.tension_limit:.4g} N",
+            "violet arrow": f"force, {scale * force_scale(scene):.3g} m for {scale:g} N",
+            "longest arrow": f"from {_LONGEST_ARROW * scene.size / force_scale(scene):.3g} N on",
         }
-        lines.append(format_table({"model": stage.name, **stage.settings, **shown}))
+        lines.append(format_table({"model": scene.name, **scene.settings, **shown}))
     log_document(stream, "settings", "\n\n".join(lines))
 
 
-def force_scale(stage: Stage) -> float:
+def force_scale(scene: SceneDescription) -> float:
     """Returns the length of a force's arrow over the force (m/N)."""
-    return 0.15 * stage.size / stage.tension_limit
+    return 0.15 * scene.size / scene.tension_limit
 
 
-def scale_forces(stage: Stage, forces: Array) -> Array:
+def scale_forces(scene: SceneDescription, forces: Array) -> Array:
     """Returns the arrows (..., 3), m, of forces (..., 3), N; no longer than the longest shown."""
-    arrows = force_scale(stage) * forces
-    longest = _LONGEST_ARROW * stage.size
+    arrows = force_scale(scene) * forces
+    longest = _LONGEST_ARROW * scene.size
     lengths = np.linalg.norm(arrows, axis=-1, keepdims=True)
     return np.asarray(arrows * np.minimum(1.0, longest / np.maximum(lengths, 1e-12)))
 
 
-def drawn_radius(stage: Stage) -> float:
+def drawn_radius(scene: SceneDescription) -> float:
     """Returns the radius that the hose is drawn with (m): its own, if that can be seen."""
-    return max(stage.hose_radius, 0.003 * stage.size)
+    return max(scene.hose_radius, 0.003 * scene.size)
 
 
 def log_geom(
-    stream: rr.RecordingStream, path: str, geom: Geom, stage: Stage, look: Look | None = None
+    stream: rr.RecordingStream,
+    path: str,
+    geom: Geom,
+    scene: SceneDescription,
+    look: Look | None = None,
 ) -> None:
     """Logs a shape once, filled, in its frame."""
     color = geom.color if look is None else look.tint(geom.color)
-    stream.log(path, make_shape(geom, stage, color), static=True)
+    stream.log(path, make_shape(geom, scene, color), static=True)
 
 
-def make_shape(geom: Geom, stage: Stage, color: Rgba) -> Any:
+def make_shape(geom: Geom, scene: SceneDescription, color: Rgba) -> Any:
     """Returns the archetype of a shape."""
     x, y, z, w = np.roll(geom.quaternion, -1)
     turn: Any = [rr.Quaternion(xyzw=[x, y, z, w])]
@@ -128,7 +132,7 @@ def make_shape(geom: Geom, stage: Stage, color: Rgba) -> Any:
     radius, half = geom.size[0], geom.size[1]
     place: dict[str, Any] = {"centers": [geom.position], "quaternions": turn}
     if geom.kind == "plane":
-        return _make_plane(geom, stage, turn, filled)
+        return _make_plane(geom, scene, turn, filled)
     if geom.kind == "box":
         return rr.Boxes3D(half_sizes=[geom.size], **place, **filled)
     if geom.kind in ("sphere", "ellipsoid"):
@@ -143,10 +147,10 @@ def make_shape(geom: Geom, stage: Stage, color: Rgba) -> Any:
     return _make_mesh(geom, color)
 
 
-def _make_plane(geom: Geom, stage: Stage, turn: Any, filled: Any) -> rr.Boxes3D:
-    """A plane ends where the stage does, if it has no end of its own."""
-    thickness = _PLANE_THICKNESS * stage.size
-    ends = np.where(geom.size[:2] > 0.0, geom.size[:2], 0.75 * stage.size)
+def _make_plane(geom: Geom, scene: SceneDescription, turn: Any, filled: Any) -> rr.Boxes3D:
+    """A plane ends where the scene does, if it has no end of its own."""
+    thickness = _PLANE_THICKNESS * scene.size
+    ends = np.where(geom.size[:2] > 0.0, geom.size[:2], 0.75 * scene.size)
     center = geom.position - rotate(geom.quaternion, np.array([0.0, 0.0, 0.5 * thickness]))
     sizes = [[*ends, 0.5 * thickness]]
     return rr.Boxes3D(half_sizes=sizes, centers=[center], quaternions=turn, **filled)
@@ -173,52 +177,52 @@ def rotate(quaternion: Array, vectors: Array) -> Array:
     return np.asarray(vectors + 2.0 * (w * crossed + np.cross(axis, crossed)))
 
 
-def _log_goal(stream: rr.RecordingStream, stage: Stage) -> None:
-    log_geom(stream, f"{SCENE}/goal", stage.goal, stage)
+def _log_goal(stream: rr.RecordingStream, scene: SceneDescription) -> None:
+    log_geom(stream, f"{SCENE}/goal", scene.goal, scene)
     label = rr.Points3D(
-        [stage.goal.position], labels=["goal"], radii=0.0, colors=[GOAL_COLOR], show_labels=True
+        [scene.goal.position], labels=["goal"], radii=0.0, colors=[GOAL_COLOR], show_labels=True
     )
     stream.log(f"{SCENE}/goal/label", label, static=True)
 
 
-def _log_bounds(stream: rr.RecordingStream, stage: Stage) -> None:
+def _log_bounds(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     """A rectangle where there is no bound upwards, a box where there is one."""
-    finite = np.isfinite(stage.bounds)
+    finite = np.isfinite(scene.bounds)
     if not finite[:, :2].all():
         return
-    low, high = stage.bounds
-    lift = 0.002 * stage.size
-    levels = stage.bounds[:, 2] if finite[:, 2].all() else np.array([stage.ground + lift])
+    low, high = scene.bounds
+    lift = 0.002 * scene.size
+    levels = scene.bounds[:, 2] if finite[:, 2].all() else np.array([scene.ground + lift])
     ring = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     rings = [np.column_stack([np.vstack([ring, ring[:1]]), np.full(5, z)]) for z in levels]
     posts = [[[*corner, levels[0]], [*corner, levels[-1]]] for corner in ring]
     strips: list[Any] = [*rings, *(posts if len(levels) > 1 else ())]
-    lines = rr.LineStrips3D(strips, colors=[BOUNDS_COLOR], radii=[0.0015 * stage.size])
+    lines = rr.LineStrips3D(strips, colors=[BOUNDS_COLOR], radii=[0.0015 * scene.size])
     stream.log(f"{SCENE}/bounds", lines, static=True)
 
 
-def _log_cells(stream: rr.RecordingStream, stage: Stage) -> None:
+def _log_cells(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     """The cells of the ground, centred on the source, as far as the bounds reach."""
-    low, high = stage.bounds[:, :2]
-    if not (stage.cell and np.all(np.isfinite(stage.bounds[:, :2]))):
+    low, high = scene.bounds[:, :2]
+    if not (scene.cell and np.all(np.isfinite(scene.bounds[:, :2]))):
         return
-    z = stage.ground + 0.001 * stage.size
+    z = scene.ground + 0.001 * scene.size
     strips = []
     for axis in (0, 1):
-        first = stage.source[axis] + stage.cell * (
-            0.5 + np.ceil((low[axis] - stage.source[axis]) / stage.cell - 0.5 - 1e-9)
+        first = scene.source[axis] + scene.cell * (
+            0.5 + np.ceil((low[axis] - scene.source[axis]) / scene.cell - 0.5 - 1e-9)
         )
-        for place in np.arange(first, high[axis] + 1e-9, stage.cell):
+        for place in np.arange(first, high[axis] + 1e-9, scene.cell):
             ends = np.array([[*low, z], [*high, z]])
             ends[:, axis] = place
             strips.append(ends)
-    lines = rr.LineStrips3D(strips, colors=[CELL_COLOR], radii=[0.0006 * stage.size])
+    lines = rr.LineStrips3D(strips, colors=[CELL_COLOR], radii=[0.0006 * scene.size])
     stream.log(f"{SCENE}/cells", lines, static=True)
 
 
-def _log_scale(stream: rr.RecordingStream, stage: Stage) -> None:
+def _log_scale(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     """A bar of the colours with tensions below it; the view counts rows down."""
-    colors, tensions = make_scale(stage.tension_limit)
+    colors, tensions = make_scale(scene.tension_limit)
     height, width = 10, len(colors)
     stream.log(SCALE, rr.Image(np.repeat(colors[None], height, axis=0)), static=True)
     low, high = tensions[0], tensions[-1]

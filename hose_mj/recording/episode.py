@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hose_mj.errors import InputError
-from hose_mj.recording.plots.palette import Rgb
+from hose_mj.recording.palette import Rgb
 
 Array = NDArray[np.float64]
 _SCENE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")

@@ -19,7 +19,7 @@ from hose_mj.recording.episode import (
     check_unique,
     lock_array,
 )
-from hose_mj.recording.plots.palette import Rgb
+from hose_mj.recording.palette import Rgb
 
 GEOM_KINDS = ("plane", "box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh")
 WORLD = -1

@@ -14,7 +14,7 @@ from hose_mj.errors import HoseError, InputError
 from hose_mj.extras import require
 from hose_mj.hoses.protocol import Array
 from hose_mj.recording.files import make_temp_beside, replace_atomically
-from hose_mj.recording.tension import color_tension
+from hose_mj.recording.palette import color_tension
 from hose_mj.recording.world_episode import WorldEpisode
 from hose_mj.scenes.mjcf.scene import Scene
 

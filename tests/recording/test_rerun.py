@@ -11,7 +11,7 @@ from hose_mj.errors import HoseError, InputError
 from hose_mj.recording import viewer
 from hose_mj.recording.episode import HoseTrack, Scene, Series
 from hose_mj.recording.framing import compute_framing, round_spacing
-from hose_mj.recording.plots.palette import COLORS
+from hose_mj.recording.palette import COLORS
 from hose_mj.recording.rerun import read_recording, take_screenshot, write_recording
 
 

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
+from hose_mj.recording.palette import color_tension
 from hose_mj.recording.scene_description import Geom, Margin, SceneDescription
-from hose_mj.recording.tension import color_tension
 from hose_mj.recording.world_episode import BreakMark, SampleBuffer
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.recording.tension import color_tension
+from hose_mj.recording.palette import color_tension
 from hose_mj.rollout import video
 
 

@@ -14,7 +14,7 @@ from hose_mj.recording.captions import format_legend, format_settings, name_quan
 from hose_mj.recording.episode import HoseTrack, Scene, Series, check_unique
 from hose_mj.recording.files import make_temp_beside, replace_atomically
 from hose_mj.recording.framing import Framing, compute_framing
-from hose_mj.recording.plots.palette import LIMIT, find_color, lighten, name_model
+from hose_mj.recording.palette import LIMIT, find_color, lighten, name_model
 from hose_mj.recording.rerun.parts import (
     APPLICATION_ID,
     DARK,

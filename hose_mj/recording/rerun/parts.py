@@ -5,7 +5,7 @@ from __future__ import annotations
 import rerun as rr
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.palette import Rgb
+from hose_mj.recording.palette import Rgb
 
 APPLICATION_ID = "hose_mj"
 TIMELINE = "sim_time"

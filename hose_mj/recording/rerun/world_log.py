@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.palette import OTHERS, Rgb, lighten
+from hose_mj.recording.palette import OTHERS, Rgb, color_tension, lighten
 from hose_mj.recording.rerun.parts import OUTCOME, TIMELINE, TURNS, make_time
 from hose_mj.recording.rerun.world_stage import (
     Look,
@@ -18,7 +18,6 @@ from hose_mj.recording.rerun.world_stage import (
     scale_forces,
 )
 from hose_mj.recording.scene_description import Margin, SceneDescription
-from hose_mj.recording.tension import color_tension
 from hose_mj.recording.world_episode import BreakMark, EpisodeEnding, Samples
 
 BREAK_COLOR: Rgb = (255, 40, 50)

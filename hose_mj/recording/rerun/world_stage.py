@@ -11,10 +11,9 @@ import rerun as rr
 
 from hose_mj.recording.captions import format_table
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.palette import Rgb, mix
+from hose_mj.recording.palette import Rgb, make_tension_scale, mix
 from hose_mj.recording.rerun.parts import log_document
 from hose_mj.recording.scene_description import WORLD, Geom, Rgba, SceneDescription
-from hose_mj.recording.tension import make_scale
 
 SCENE = "world/scene"
 SCALE = "tension"
@@ -222,7 +221,7 @@ def _log_cells(stream: rr.RecordingStream, scene: SceneDescription) -> None:
 
 def _log_scale(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     """A bar of the colours with tensions below it; the view counts rows down."""
-    colors, tensions = make_scale(scene.tension_limit)
+    colors, tensions = make_tension_scale(scene.tension_limit)
     height, width = 10, len(colors)
     stream.log(SCALE, rr.Image(np.repeat(colors[None], height, axis=0)), static=True)
     low, high = tensions[0], tensions[-1]

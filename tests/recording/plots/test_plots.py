@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
+from hose_mj.recording.palette import COLORS, find_model, lighten, name_model
 from hose_mj.recording.plots import api as plots
-from hose_mj.recording.plots.axes import format_percent, format_seconds
 from hose_mj.recording.plots.labels import Label, label_points, spread_apart
-from hose_mj.recording.plots.palette import COLORS, find_model, lighten, name_model
 from hose_mj.recording.plots.shapes import choose_label_point, choose_size, group_places
 from hose_mj.recording.plots.statics import shade
-from hose_mj.recording.plots.style import make_axes
+from hose_mj.recording.plots.style import format_percent, format_seconds, make_axes
 
 TIMES = np.linspace(0.0, 1.0, 20)
 MODELS = ("geds", "cable", "flex", "hinge-chain")

@@ -235,8 +235,8 @@ def test_the_rules_catch(module, line):
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("hose_mj.recording.rerun.grid", "import rerun as rr"),
-        ("hose_mj.recording.rerun.grid", "from hose_mj.recording.episode import Scene"),
+        ("hose_mj.recording.rerun.episodes", "import rerun as rr"),
+        ("hose_mj.recording.rerun.episodes", "from hose_mj.recording.episode import Scene"),
         ("hose_mj.world.world", "from hose_mj.hoses.protocol import HoseModel"),
         ("hose_mj.envs.gym", "from hose_mj.tasks.task import Task"),
         ("hose_learning.loop", "from hose_mj import InputError"),

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.recording import viewer
 from hose_mj.recording.episode import HoseTrack, Scene, Series
-from hose_mj.recording.framing import compute_framing, round_spacing
 from hose_mj.recording.palette import COLORS
-from hose_mj.recording.rerun import read_recording, take_screenshot, write_recording
+from hose_mj.recording.rerun import read_recording, take_screenshot, viewer, write_recording
+from hose_mj.recording.rerun.comparison import compute_framing
+from hose_mj.recording.rerun.parts import round_spacing
 
 
 def make_swing(name, lag=0.0, sideways=0.0, n_times=30):

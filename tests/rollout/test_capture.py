@@ -15,8 +15,8 @@ from hose_mj.recording.rerun import (
     take_screenshot,
     write_world_recording,
 )
-from hose_mj.recording.rerun.live import check_url
-from hose_mj.recording.rerun.world_stage import rotate
+from hose_mj.recording.rerun.episodes import check_url
+from hose_mj.recording.rerun.world_scene import rotate
 from hose_mj.recording.world_table import write_csv
 from hose_mj.rollout.capture import Capture
 from hose_mj.rollout.staging import Cast, HoseReader, make_stage

@@ -10,7 +10,7 @@ import rerun as rr
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import OTHERS, Rgb, color_tension, lighten
 from hose_mj.recording.rerun.parts import OUTCOME, TIMELINE, TURNS, make_time
-from hose_mj.recording.rerun.world_stage import (
+from hose_mj.recording.rerun.world_scene import (
     Look,
     drawn_radius,
     log_robots,

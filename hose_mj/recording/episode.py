@@ -1,4 +1,4 @@
-"""What was simulated, in memory: hoses over time, numbers over time, and the scene around them.
+"""Holds what was simulated, in memory: hoses and numbers over time, and the scene around them.
 
 Nothing here reads or writes a file. Arrays are copied, made float64 and locked on construction.
 """
@@ -91,7 +91,7 @@ class Series:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is shown together: one case of a comparison, or one episode.
+    """Hoses and numbers that are shown together: one case of a comparison, or one episode.
 
     Attributes:
         name: short and stable, letters, digits, ".", "_" and "-" ("tip-load").

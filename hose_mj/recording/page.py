@@ -243,7 +243,7 @@ def format_value(value: Any) -> str:
 
 
 def is_numeric(cells: Sequence[str]) -> bool:
-    """Whether a column has numbers and, but for blanks, nothing else."""
+    """Says whether a column has numbers and, but for blanks, nothing else."""
     filled = [cell.strip() for cell in cells if cell.strip() not in _BLANKS]
     return bool(filled) and all(_NUMBER.fullmatch(cell) for cell in filled)
 

@@ -98,7 +98,7 @@ class Margin:
 
 
 class KindStyle(NamedTuple):
-    """How a kind of constraint is shown; a kind without a style takes a spare colour.
+    """The look of a kind of constraint in plots; a kind without a style takes a spare colour.
 
     Attributes:
         name: of the kind, as `Margin.kind` has it.
@@ -193,17 +193,17 @@ class SceneDescription:
 
     @property
     def size(self) -> float:
-        """Largest extent of the space worth looking at (m)."""
+        """Returns the largest extent of the space worth looking at (m)."""
         return float(np.max(self.high - self.low))
 
     @property
     def ground(self) -> float:
-        """Height of the highest plane, or of the lowest thing where there is none (m)."""
+        """Returns the height of the highest plane, or of the lowest thing without one (m)."""
         planes = [geom.position[2] for geom in self.geoms if geom.kind == "plane"]
         return float(max(planes, default=self.low[2]))
 
     @property
     def is_planar(self) -> bool:
-        """Whether it is much wider than high."""
+        """Says whether it is much wider than high."""
         extent = self.high - self.low
         return bool(extent[2] < 0.4 * max(extent[:2]))

@@ -1,4 +1,4 @@
-"""What happened in a world, in memory: the scene, samples over time, and how it ended.
+"""Holds what happened in a world, in memory: the scene, samples over time, and how it ended.
 
 Plain data, whatever simulated it; nothing here reads or writes a file. World frame, SI units.
 Samples are rows of one structured array: appending copies numbers and makes no objects.
@@ -81,18 +81,18 @@ class Samples:
 
     @property
     def times(self) -> Array:
-        """Simulated times (k,), s."""
+        """Returns the simulated times (k,), s."""
         return np.asarray(self.rows["time"], dtype=np.float64)
 
     @property
     def has_turns(self) -> bool:
-        """Whether agents move in turns that are counted."""
+        """Says whether agents move in turns that are counted."""
         return bool(self.rows["turn"][0] != NO_TURN)
 
 
 @dataclass(frozen=True, eq=False)
 class BreakMark:
-    """Where and when a constraint broke.
+    """A broken constraint: which, where and when.
 
     Attributes:
         kind: "stretch", "collision", ...
@@ -118,7 +118,7 @@ class BreakMark:
 
 @dataclass(frozen=True, eq=False)
 class EpisodeEnding:
-    """How an episode ended: in words ("break", "goal", "time"), and the break if there was one."""
+    """An ending of an episode: in words ("break", "goal", "duration"), and the break if one was."""
 
     ended_by: str
     mark: BreakMark | None = None
@@ -164,7 +164,7 @@ class SampleBuffer:
 
     @property
     def is_full(self) -> bool:
-        """Whether another sample would make it coarser."""
+        """Says whether another sample would make it coarser."""
         return len(self) >= self._most
 
     def append(self, owner: str = "", vetoed: str = "", event: str = "", **numbers: Any) -> None:

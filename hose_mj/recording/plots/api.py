@@ -13,7 +13,7 @@ from hose_mj.recording.plots.style import choose_length_unit, format_seconds
 from hose_mj.recording.plots.work import (
     Gap,
     WorkPoint,
-    find_pareto_front,
+    compute_pareto_front,
     plot_overview,
     plot_work_precision,
 )
@@ -26,7 +26,7 @@ __all__ = [
     "Gap",
     "WorkPoint",
     "choose_length_unit",
-    "find_pareto_front",
+    "compute_pareto_front",
     "format_seconds",
     "measure_order",
     "plot_bars",

@@ -45,7 +45,7 @@ def plot_convergence(
     ylabel: str = "error",
     in_seconds: bool = False,
 ) -> bytes:
-    """Error against resolution, both logarithmic; each line's name and slope stand at its end.
+    """Draws error over resolution, both logarithmic; each line's name and slope stand at its end.
 
     Args:
         title: text.
@@ -96,7 +96,7 @@ def plot_series(
     limits: Mapping[str, float] | None = None,
     logy: bool = False,
 ) -> bytes:
-    """Numbers over time, each line named at its end; `limits` are drawn across with their names."""
+    """Draws numbers over time, lines named at their ends; `limits` go across with their names."""
     check_some("groups", groups)
     looks = choose_looks(list(groups))
     ends, ink = [], format_hex(LIMIT)
@@ -153,7 +153,7 @@ def plot_twist(
     twists: Mapping[str, ArrayLike],
     knots: ArrayLike = (),
 ) -> bytes:
-    """Shape above, twist below, over one axis of arc length.
+    """Draws the shape above, the twist below, over one axis of arc length.
 
     Args:
         title: text.

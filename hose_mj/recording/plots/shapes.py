@@ -62,7 +62,7 @@ def plot_shapes(
     times: Sequence[float] | None = None,
     outlines: Sequence[Array] = (),
 ) -> bytes:
-    """Hoses seen along one axis, to scale, several models over each other.
+    """Draws hoses seen along one axis, to scale, several models over each other.
 
     Args:
         title: text.
@@ -129,7 +129,7 @@ def label_snapshots(
 
 
 def plot_fan(title: str, fans: Sequence[Fan], plane: tuple[int, int] = (0, 2)) -> bytes:
-    """Equilibria over a parameter, to scale; names of the parameters stand at the tips."""
+    """Draws equilibria over a parameter, to scale; names of the parameters stand at the tips."""
     check_some("fans", fans)
     stacks = [_flatten(fan.curves, plane) for fan in fans]
     every = np.concatenate([curve[0] for stack in stacks for curve in stack.values()])
@@ -188,7 +188,7 @@ def choose_label_point(stack: Array) -> int:
 
 
 def _list_corners(stacks: Mapping[str, Array]) -> list[Array]:
-    """All points drawn, (k, 2) each."""
+    """Returns all points drawn, (k, 2) each."""
     return [stack.reshape(-1, 2) for stack in stacks.values()]
 
 
@@ -200,7 +200,7 @@ def _flatten(curves: Mapping[str, ArrayLike], plane: tuple[int, int]) -> dict[st
 
 
 def _set_view(axes: Axes, points: Array, unit: str, plane: tuple[int, int]) -> None:
-    """Equal scales, and limits close about the points."""
+    """Sets equal scales, and limits close about the points."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 0.12 * float((high - low).max()) or 1.0)
     middle = 0.5 * (low + high)

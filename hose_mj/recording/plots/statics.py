@@ -56,7 +56,7 @@ class ErrorPoint:
 def plot_errors(
     title: str, points: Sequence[ErrorPoint], ylabel: str = "error (of the reference)"
 ) -> bytes:
-    """Error over resolution, both logarithmic, in panels that share the errors' axis.
+    """Draws error over resolution, both logarithmic, in panels that share the errors' axis.
 
     Filled marks on full lines are clamp-corrected or in no need of it, hollow ones on faint dotted
     lines as documented.

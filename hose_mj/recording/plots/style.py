@@ -67,7 +67,7 @@ DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 
 @dataclass(frozen=True)
 class Look:
-    """How one group is drawn: "#rrggbb", the same for text, marker, dash pattern."""
+    """The look of one group: "#rrggbb", the same for text, marker, dash pattern."""
 
     color: str
     ink: str
@@ -93,7 +93,7 @@ def choose_looks(labels: Sequence[str]) -> dict[str, Look]:
 
 @contextmanager
 def make_figure(size: tuple[float, float], title: str = "") -> Iterator[Figure]:
-    """A figure of `size` inches in the house style; no global state is touched."""
+    """Yields a figure of `size` inches in the house style; no global state is touched."""
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
@@ -104,7 +104,7 @@ def make_figure(size: tuple[float, float], title: str = "") -> Iterator[Figure]:
 
 @contextmanager
 def make_axes(title: str, size: tuple[float, float]) -> Iterator[tuple[Figure, Axes]]:
-    """A figure with one axes."""
+    """Yields a figure with one axes."""
     with make_figure(size, title) as figure:
         yield figure, figure.add_subplot()
 
@@ -211,7 +211,7 @@ def choose_length_unit(size: float) -> tuple[str, float]:
 
 
 def is_positive(value: float) -> bool:
-    """Whether a logarithmic axis can show a value."""
+    """Says whether a logarithmic axis can show a value."""
     return bool(np.isfinite(value) and value > 0.0)
 
 

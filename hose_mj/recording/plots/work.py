@@ -69,13 +69,13 @@ class WorkPoint:
 
     @property
     def is_raw(self) -> bool:
-        """Whether this is a result before its clamp was corrected."""
+        """Says whether this is a result before its clamp was corrected."""
         return self.clamp_corrected is False and not self.model.startswith("geds")
 
 
 @dataclass(frozen=True)
 class Gap:
-    """What a peer costs more at equal error.
+    """An arrow that says what a peer costs more at equal error.
 
     Attributes:
         at_error: the level, as a fraction.
@@ -90,7 +90,7 @@ class Gap:
 
 
 def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()) -> bytes:
-    """Error against cost, both logarithmic; lower left is better.
+    """Draws error against cost, both logarithmic; lower left is better.
 
     The line of a model joins its Pareto front: the settings that no other of its settings beats in
     both error and cost. Only they are marked and labelled; all others are faint dots. Hollow marks
@@ -111,7 +111,7 @@ def plot_overview(
     gaps: Sequence[Gap],
     captions: tuple[str, str],
 ) -> bytes:
-    """Snapshots in the x-z plane beside the work-precision plot, 1600 by 700 pixels.
+    """Draws snapshots in the x-z plane beside the work-precision plot, 1600 by 700 pixels.
 
     Args:
         curves: label to snapshots (k, m, 3), the lowest first.
@@ -148,7 +148,7 @@ def _write_caption(axes: Axes, caption: str) -> None:
 
 @dataclass(frozen=True)
 class WorkDrawing:
-    """What was drawn, for its legend and its labels.
+    """The parts of a plot that its legend and its labels have to know.
 
     Attributes:
         handles: what the legend has to hold.
@@ -201,7 +201,7 @@ def label_work_precision(
     label_points(figure, axes, wanted, drawing.lines, drawing.notes)
 
 
-def find_pareto_front(cost: Array, error: Array) -> Array:
+def compute_pareto_front(cost: Array, error: Array) -> Array:
     """Returns the indices, by rising cost, of the points that no other beats in both."""
     best, front = np.inf, []
     for i in np.lexsort((error, cost)):
@@ -216,7 +216,7 @@ def _draw_series(axes: Axes, group: Sequence[WorkPoint], look: Look) -> list[Wor
     raw = group[0].is_raw
     cost = np.array([p.wall_s_per_sim_s for p in group])
     error = np.array([p.error for p in group])
-    front = find_pareto_front(cost, error)
+    front = compute_pareto_front(cost, error)
     beaten = np.setdiff1d(np.arange(len(group)), front)
     faint: dict[str, Any] = {"ls": "", "marker": look.marker, "ms": 2.6, "alpha": 0.28, "mew": 0.5}
     face = "none" if raw else look.color
@@ -239,7 +239,7 @@ def _draw_series(axes: Axes, group: Sequence[WorkPoint], look: Look) -> list[Wor
 
 
 def _draw_real_time(axes: Axes) -> None:
-    """A line where a simulated second takes a second."""
+    """Draws a line where a simulated second takes a second."""
     low, high = axes.get_xlim()
     if low < 1.0 < high:
         axes.axvline(1.0, color="#bbbbbb", lw=0.8, zorder=1)
@@ -314,13 +314,13 @@ def _choose_labels(
 
 
 def _find_reaching(front: Sequence[WorkPoint]) -> list[WorkPoint]:
-    """The cheapest point below each level."""
+    """Returns the cheapest point below each level."""
     reached = ([p for p in front if p.error <= level] for level in ERRORS)
     return [min(some, key=lambda p: p.wall_s_per_sim_s) for some in reached if some]
 
 
 def _locate(axes: Axes, point: WorkPoint) -> Array:
-    """Where a point lies, in pixels."""
+    """Returns where a point lies, in pixels."""
     return np.asarray(axes.transData.transform((point.wall_s_per_sim_s, point.error)))
 
 

@@ -64,7 +64,7 @@ class Framing:
 
     @property
     def eye_up(self) -> Array:
-        """The world axis that stays upright when the reader turns the view, (3,)."""
+        """Returns the world axis that stays upright when the reader turns the view, (3,)."""
         axis: Array = np.eye(3)[int(np.argmax(np.abs(self.up)))]
         return axis
 

@@ -1,4 +1,4 @@
-"""What all recordings have in common: stream, timeline, plain entities, texts, round spacings."""
+"""Pieces that all recordings share: stream, timeline, plain entities, texts, round spacings."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where a client connects to."""
+        """Returns where a client connects to."""
         return f"rerun+http://{_HOST}:{self.port}/proxy"
 
     def check_alive(self, grace_s: float = 0.0) -> None:
@@ -110,7 +110,7 @@ def open_window(*files: Path) -> str:
 
 
 def has_display() -> bool:
-    """Whether a window can be opened; taken for granted where X11 and Wayland are not usual."""
+    """Says whether a window can be opened; it can where X11 and Wayland are not usual."""
     named = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
     return bool(named) or not sys.platform.startswith("linux")
 

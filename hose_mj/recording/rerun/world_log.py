@@ -174,7 +174,7 @@ class WorldLog:
             self._stream.send_columns(self._margin_path(unit, "limit"), ends, zeros)
 
     def _add_states(self, samples: Samples) -> None:
-        """Only changes are logged: a state lasts until the next."""
+        """Logs changes only: a state lasts until the next."""
         for kind, texts, last in (
             ("turn", samples.owners, self._owner),
             ("vetoed", samples.vetoed, self._vetoed),
@@ -202,7 +202,7 @@ class WorldLog:
         self._stream.send_columns(path_of(self._scene, name), index, columns)
 
     def _mark_break(self, mark: BreakMark) -> None:
-        """A red ball in space, a red state, and an error in the log, from its time on."""
+        """Logs a red ball in space, a red state, and an error in the log, from its time on."""
         stream, scene = self._stream, self._scene
         stream.set_log_time_enabled(False)
         stream.set_time(TIMELINE, duration=mark.time)

@@ -1,4 +1,4 @@
-"""What of an episode in a world does not move, as Rerun entities, and the layout that shows it."""
+"""Logs what of an episode in a world stands still, and lays out what the viewer shows of it."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ SCENE = "world/scene"
 SCALE = "tension"
 GOAL_COLOR = (60, 200, 110)
 TINTS: tuple[Rgb, ...] = ((255, 255, 255), (0, 190, 170), (225, 110, 200), (110, 150, 255))
-"""Of the overlaid episodes from the second on: none is near a colour of the tension."""
+"""Colours of the overlaid episodes from the second on: none is near one of the tension."""
 BOUNDS_COLOR = (150, 165, 185)
 CELL_COLOR = (120, 132, 148)
 _LONGEST_ARROW = 0.3
-"""Of the scene's size: forces that want longer arrows are cut."""
+"""Largest length of an arrow over the scene's size: longer ones are cut."""
 _PLANE_THICKNESS = 0.004
-"""Of the scene's size: a plane is drawn as a thin box whose top it is."""
+"""Thickness, over the scene's size, of the thin box whose top stands for a plane."""
 _LOOKS = {True: (0.25, -0.8, 0.95), False: (0.45, -1.0, 0.5)}
 """Where the eye is, seen from the middle of a flat scene or of a high one."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """How one of several overlaid episodes is told apart.
+    """The look that tells one of several overlaid episodes apart.
 
     Attributes:
         rank: 0 for the first, in the scene's own colours; the others are tinted and see-through.
@@ -157,7 +157,7 @@ def make_shape(geom: Geom, scene: SceneDescription, color: Rgba) -> Any:
 
 
 def _make_plane(geom: Geom, scene: SceneDescription, turn: Any, filled: Any) -> rr.Boxes3D:
-    """A plane ends where the scene does, if it has no end of its own."""
+    """Returns a plane as a thin box; it ends where the scene does, if it has no end of its own."""
     thickness = _PLANE_THICKNESS * scene.size
     ends = np.where(geom.size[:2] > 0.0, geom.size[:2], 0.75 * scene.size)
     center = geom.position - rotate(geom.quaternion, np.array([0.0, 0.0, 0.5 * thickness]))
@@ -195,7 +195,7 @@ def _log_goal(stream: rr.RecordingStream, scene: SceneDescription) -> None:
 
 
 def _log_bounds(stream: rr.RecordingStream, scene: SceneDescription) -> None:
-    """A rectangle where there is no bound upwards, a box where there is one."""
+    """Logs a rectangle where there is no bound upwards, a box where there is one."""
     finite = np.isfinite(scene.bounds)
     if not finite[:, :2].all():
         return
@@ -211,7 +211,7 @@ def _log_bounds(stream: rr.RecordingStream, scene: SceneDescription) -> None:
 
 
 def _log_cells(stream: rr.RecordingStream, scene: SceneDescription) -> None:
-    """The cells of the ground, centred on the source, as far as the bounds reach."""
+    """Logs the cells of the ground, centred on the source, as far as the bounds reach."""
     low, high = scene.bounds[:, :2]
     if not (scene.cell and np.all(np.isfinite(scene.bounds[:, :2]))):
         return
@@ -230,7 +230,7 @@ def _log_cells(stream: rr.RecordingStream, scene: SceneDescription) -> None:
 
 
 def _log_scale(stream: rr.RecordingStream, scene: SceneDescription) -> None:
-    """A bar of the colours with tensions below it; the view counts rows down."""
+    """Logs a bar of the colours with tensions below it; the view counts rows down."""
     colors, tensions = make_tension_scale(scene.tension_limit)
     height, width = 10, len(colors)
     stream.log(SCALE, rr.Image(np.repeat(colors[None], height, axis=0)), static=True)
@@ -288,7 +288,7 @@ def make_world_blueprint(scenes: Sequence[SceneDescription], follow: bool = Fals
 
 
 def _make_log() -> rrb.TextLogView:
-    """Time, level and text: whose entity it is says little."""
+    """Shows time, level and text: whose entity it is says little."""
     columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
     return rrb.TextLogView(origin="/log", name="Events", columns=columns)
 
@@ -347,7 +347,7 @@ def _make_scale(scene: SceneDescription) -> rrb.Spatial2DView:
 
 
 def _make_plots(scenes: Sequence[SceneDescription]) -> rrb.Horizontal:
-    """One plot for each unit of the margins, and the reward."""
+    """Returns one plot for each unit of the margins, and the reward."""
     names = [rr.escape_entity_path_part(scene.name) for scene in scenes]
     units = dict.fromkeys(margin.unit for scene in scenes for margin in scene.margins)
     plots = [

@@ -152,7 +152,7 @@ def test_quantities_have_units_that_suit_them():
 
 def test_the_pareto_front_has_no_beaten_point():
     cost, error = np.array([1.0, 2.0, 2.0, 3.0, 4.0]), np.array([5.0, 4.0, 6.0, 4.5, 1.0])
-    assert plots.find_pareto_front(cost, error).tolist() == [0, 1, 4]
+    assert plots.compute_pareto_front(cost, error).tolist() == [0, 1, 4]
 
 
 def test_the_order_of_an_exact_power_law_is_measured():

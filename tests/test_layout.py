@@ -14,7 +14,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 # What each part stands on; the longest prefix of a module's name decides its part.
-_BASE = {"hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets"}
+_BASE = {
+    *("hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets", "hose_mj.extras"),
+}
 _SCENES = _BASE | {"hose_mj.hoses.spec"}
 _HOSES = _BASE | {"hose_mj.hoses.spec"}
 _WORLD = _SCENES | {"hose_mj.hoses", "hose_mj.scenes"}
@@ -24,8 +26,9 @@ FLOORS = {
     "hose_mj.errors": set(),
     "hose_mj.assets": {"hose_mj.errors"},
     "hose_mj.checks": {"hose_mj.errors"},
+    "hose_mj.extras": {"hose_mj.errors"},
     "hose_mj.jit": set(),
-    "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks"},
+    "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.extras"},
     "hose_mj.hoses.spec": {"hose_mj.errors"},
     "hose_mj.hoses": _HOSES,
     "hose_mj.scenes": _SCENES,
@@ -34,10 +37,13 @@ FLOORS = {
     "hose_mj.constraints": _CONSTRAINTS,
     "hose_mj.rollout": _CONSTRAINTS | {"hose_mj.constraints", "hose_mj.recording"},
     "hose_mj.tasks": {"hose_mj.errors", "hose_mj.jit"},
-    "hose_mj.envs": {"hose_mj.errors", "hose_mj.jit", "hose_mj.tasks", "hose_mj.recording"},
+    "hose_mj.envs": {
+        *("hose_mj.errors", "hose_mj.extras", "hose_mj.jit", "hose_mj.tasks"),
+        "hose_mj.recording",
+    },
     "hose_learning": {
         *("hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.envs"),
-        *("hose_mj.tasks", "hose_mj.recording"),
+        *("hose_mj.tasks", "hose_mj.recording", "hose_mj.extras"),
     },
     "hose_mj.cli": {"hose_mj", "hose_learning"},
 }
@@ -229,8 +235,8 @@ def test_the_rules_catch(module, line):
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("hose_mj.recording.rerun.grid", "import rerun as rr"),
-        ("hose_mj.recording.rerun.grid", "from hose_mj.recording.episode import Scene"),
+        ("hose_mj.recording.rerun.episodes", "import rerun as rr"),
+        ("hose_mj.recording.rerun.episodes", "from hose_mj.recording.episode import Scene"),
         ("hose_mj.world.world", "from hose_mj.hoses.protocol import HoseModel"),
         ("hose_mj.envs.gym", "from hose_mj.tasks.task import Task"),
         ("hose_learning.loop", "from hose_mj import InputError"),

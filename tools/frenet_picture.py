@@ -10,7 +10,7 @@ import numpy as np
 from hose_mj import HoseSpec
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.plots.twist import plot_twist
+from hose_mj.recording.plots.curves import plot_twist
 
 CONTROL_POINTS = 16
 SPEC = HoseSpec(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hose_mj.recording.plots.palette import OTHERS, format_hex
+from hose_mj.recording.palette import OTHERS, format_hex
 from hose_mj.recording.plots.style import SOFT, add_legend, encode_png, make_axes
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from rich.table import Table
 from hose_mj.assets import find_assets
 from hose_mj.cli.compare import MODELS
 from hose_mj.errors import InputError
+from hose_mj.recording.palette import name_model
 from hose_mj.recording.plots.api import format_seconds
-from hose_mj.recording.plots.palette import name_model
 from hose_mj.scenes.hose_file.hose_file import OwnHose, read_own_hose
 from hose_mj.validation.compare import compute_ratios
 from hose_mj.validation.study import Study

@@ -20,7 +20,7 @@ from hose_mj.errors import InputError
 from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.plots.learning import Curve, Panel, plot_learning
+from hose_mj.recording.plots.curves import Curve, Panel, plot_learning
 from hose_mj.tasks.task import Task
 
 Measured = npt.NDArray[np.float64]

@@ -101,7 +101,7 @@ class Recording:
         wishes = self._wishes
         if not (wishes.save or wishes.connect or wishes.spawn):
             return []
-        from hose_mj.recording.rerun.live import open_sinks
+        from hose_mj.recording.rerun.episodes import open_sinks
 
         return open_sinks(wishes.save, wishes.connect, wishes.spawn)
 
@@ -109,7 +109,7 @@ class Recording:
         """Writes what needs whole episodes."""
         wishes = self._wishes
         if self._overlays and wishes.save is not None:
-            from hose_mj.recording.rerun.world_files import write_world_recording
+            from hose_mj.recording.rerun.episodes import write_world_recording
 
             write_world_recording(wishes.save, [one.episode() for one in self._captures])
         if wishes.csv is not None:

@@ -1,4 +1,4 @@
-"""What was simulated, in memory: hoses over time, numbers over time, and the scene around them.
+"""Holds what was simulated, in memory: hoses and numbers over time, and the scene around them.
 
 Nothing here reads or writes a file. Arrays are copied, made float64 and locked on construction.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hose_mj.errors import InputError
-from hose_mj.recording.plots.palette import Rgb
+from hose_mj.recording.palette import Rgb
 
 Array = NDArray[np.float64]
 _SCENE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -91,7 +91,7 @@ class Series:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is shown together: one case of a comparison, or one episode.
+    """Hoses and numbers that are shown together: one case of a comparison, or one episode.
 
     Attributes:
         name: short and stable, letters, digits, ".", "_" and "-" ("tip-load").

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hose_mj.errors import InputError
-from hose_mj.recording.plots.palette import Rgb
+from hose_mj.recording.palette import Rgb
 
 Array = NDArray[np.float64]
 

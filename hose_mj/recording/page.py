@@ -6,31 +6,48 @@
     case.figure(png, alt="...", caption="...")
     page.write(path)
 
+`page.html` beside this file is their frame and their style sheet, for screens, phones and print.
+
 All text is escaped. In running text `code` and **strong** are marked as in Markdown.
 """
 
 from __future__ import annotations
 
+import base64
 import re
+import struct
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from string import Template
+from typing import Any
 
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.page_checks import format_checks
-from hose_mj.recording.page_parts import (
-    Picture,
-    format_cell,
-    format_picture,
-    format_text,
-    format_value,
-    is_numeric,
-)
-from hose_mj.recording.page_style import CSS
 
-__all__ = ["Block", "Fold", "Page", "Picture", "Section"]
+_PNG = b"\x89PNG\r\n\x1a\n"
+_MINUS, _TIMES, _DASH = "\u2212", "\u00d7", "\u2013"
+_NUMBER = re.compile(
+    rf"[-+{_MINUS}±<>≈~]?\s*(\d[\d\s.,]*|\.\d+|nan|inf)(e[-+{_MINUS}]?\d+)?\s*[%{_TIMES}]?",
+    re.IGNORECASE,
+)
+_DENSITY = 1.5  # dots of a picture per CSS pixel
+_BLANKS = {"", "-", _DASH}
+_SIGNS = {"<=": "\u2264", ">=": "\u2265", "==": "=", "<": "<", ">": ">"}
+_OTHERS = "Others"
+_BAD = '<span class="badge failed">failed</span>'
+
+
+@dataclass(frozen=True)
+class Picture:
+    """PNG bytes with the words for those who cannot see it and those below it."""
+
+    png: bytes
+    alt: str
+    caption: str = ""
 
 
 class Block:
@@ -72,15 +89,10 @@ class Block:
                 )
         cells = [[format_value(value) for value in row] for row in rows]
         right = [is_numeric([row[column] for row in cells]) for column in range(len(header))]
-        head = "".join(format_cell("th", text, r) for text, r in zip(header, right, strict=True))
-        rows_of_cells = [
-            "".join(format_cell("td", text, r) for text, r in zip(row, right, strict=True))
-            for row in cells
-        ]
-        body = "".join(f"<tr>{row}</tr>\n" for row in rows_of_cells)
-        title = f"<caption>{format_text(caption)}</caption>" if caption else ""
+        body = "".join(f"{_format_row('td', row, right)}\n" for row in cells)
+        title = _wrap("<caption>", caption, "</caption>")
         self._parts.append(
-            f'<div class="scroll"><table>{title}<thead><tr>{head}</tr></thead>\n'
+            f'<div class="scroll"><table>{title}<thead>{_format_row("th", header, right)}</thead>\n'
             f"<tbody>{body}</tbody></table></div>"
         )
 
@@ -192,22 +204,141 @@ class Page(Block):
     def render(self) -> str:
         """Returns the whole document."""
         entries = "".join(section.render_entry() for section in self.sections)
-        contents = f'<nav aria-label="Contents"><ol>{entries}</ol></nav>' if entries else ""
-        subtitle = f'<p class="subtitle">{format_text(self.subtitle)}</p>' if self.subtitle else ""
-        footer = f"<footer>{format_text(self.footer)}</footer>" if self.footer else ""
-        return "\n".join(
-            [
-                '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>',
-                '<meta name="viewport" content="width=device-width, initial-scale=1"/>',
-                f"<title>{escape(self.title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>",
-                f"<header><h1>{format_text(self.title)}</h1>{subtitle}</header>",
-                super().render(),
-                contents,
-                *(section.render() for section in self.sections),
-                f"{footer}\n</main>\n</body>\n</html>\n",
-            ]
+        frame = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
+        return frame.substitute(
+            title=escape(self.title),
+            heading=format_text(self.title),
+            subtitle=_wrap('<p class="subtitle">', self.subtitle, "</p>"),
+            intro=super().render(),
+            contents=f'<nav aria-label="Contents"><ol>{entries}</ol></nav>' if entries else "",
+            sections="\n".join(section.render() for section in self.sections),
+            footer=_wrap("<footer>", self.footer, "</footer>"),
         )
 
     def write(self, path: Path) -> None:
         """Writes the page; a reader sees the old file or the whole new one."""
         write_atomically(Path(path), self.render().encode("utf-8"))
+
+
+def format_text(text: str) -> str:
+    """Escapes a text and marks its `code` and **strong** words."""
+    pieces = re.split(r"`([^`]+)`", str(text))
+    return "".join(
+        f"<code>{escape(piece)}</code>"
+        if position % 2
+        else re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", escape(piece))
+        for position, piece in enumerate(pieces)
+    )
+
+
+def format_value(value: Any) -> str:
+    """Returns a table cell's text: four digits of a float, nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}".replace("-", _MINUS)
+    return str(value)
+
+
+def is_numeric(cells: Sequence[str]) -> bool:
+    """Says whether a column has numbers and, but for blanks, nothing else."""
+    filled = [cell.strip() for cell in cells if cell.strip() not in _BLANKS]
+    return bool(filled) and all(_NUMBER.fullmatch(cell) for cell in filled)
+
+
+def format_picture(picture: Picture) -> str:
+    """Returns a figure with its PNG inside."""
+    if not picture.png.startswith(_PNG):
+        raise InputError("png", picture.png[:8], "the bytes of a PNG picture")
+    width, height = (round(side / _DENSITY) for side in struct.unpack(">II", picture.png[16:24]))
+    caption = _wrap("<figcaption>", picture.caption, "</figcaption>")
+    data = base64.b64encode(picture.png).decode("ascii")
+    return (
+        f'<figure><div class="card"><img alt="{escape(picture.alt)}" width="{width}" '
+        f'height="{height}" src="data:image/png;base64,{data}"/></div>{caption}</figure>'
+    )
+
+
+def _wrap(start: str, text: str, end: str) -> str:
+    """Returns an element around a text, nothing around none."""
+    return f"{start}{format_text(text)}{end}" if text else ""
+
+
+def _format_row(tag: str, cells: Sequence[str], right: Sequence[bool]) -> str:
+    """Returns a row of a table, cells of columns of numbers marked as such."""
+    kinds = [' class="number"' if number else "" for number in right]
+    inner = (f"<{tag}{k}>{format_text(c)}</{tag}>" for c, k in zip(cells, kinds, strict=True))
+    return f"<tr>{''.join(inner)}</tr>"
+
+
+def format_checks(checks: Sequence[Check]) -> str:
+    """Returns the failed checks as a list, and all of them as small tables side by side."""
+    failed = [check for check in checks if not check.ok]
+    above = f'<ul class="checks">{"".join(map(_format_failed, failed))}</ul>' if failed else ""
+    groups = [_format_group(heading, some) for heading, some in group_checks(checks).items()]
+    kind = "groups one" if len(groups) == 1 else "groups"
+    return f'{above}<div class="{kind}">{"".join(groups)}</div>'
+
+
+def group_checks(checks: Sequence[Check]) -> dict[str, list[tuple[str, Check]]]:
+    """Groups checks whose names share what is before or behind ": ", or before the last ", ".
+
+    Returns:
+        Heading to the rest of each name with its check. Checks that share nothing come last.
+    """
+    splits = [_split(check.name) for check in checks]
+    counts = Counter(part for split in splits for part in split if part)
+    groups: dict[str, list[tuple[str, Check]]] = {}
+    for (head, tail), check in zip(splits, checks, strict=True):
+        heading, rest = _OTHERS, check.name
+        if tail and counts[head] > 1:
+            heading, rest = head, tail
+        elif ": " in check.name and counts[tail] > 1:
+            heading, rest = tail, head
+        groups.setdefault(heading, []).append((rest, check))
+    if _OTHERS in groups:
+        groups[_OTHERS] = groups.pop(_OTHERS)
+    return groups
+
+
+def _split(name: str) -> tuple[str, str]:
+    head, colon, tail = name.partition(": ")
+    if not colon:
+        head, _, tail = name.rpartition(", ")
+        head, tail = (head, tail) if head else (tail, "")
+    return head, tail
+
+
+def _format_failed(check: Check) -> str:
+    """Returns one line with everything about a check."""
+    detail = f"{format_value(check.value)}, limit {_format_limit(check)}"
+    return (
+        f"<li>{_BAD}<span>{format_text(check.name)}</span>"
+        f'<span class="detail">{format_text(detail)}</span></li>\n'
+    )
+
+
+def _format_group(heading: str, members: Sequence[tuple[str, Check]]) -> str:
+    """Returns a small table; a limit that all share stands in its caption."""
+    limits = {_format_limit(check) for _, check in members}
+    shared = limits.pop() if len(limits) == 1 else ""
+    rows = "".join(_format_check(rest, check, not shared) for rest, check in members)
+    title = f"{heading[:1].upper()}{heading[1:]}"
+    above = _wrap("<span>", shared, "</span>")
+    return f"<table><caption>{format_text(title)} {above}</caption><tbody>{rows}</tbody></table>\n"
+
+
+def _format_check(rest: str, check: Check, with_limit: bool) -> str:
+    badge = '<span class="badge ok">ok</span>' if check.ok else _BAD
+    limit = f'<td class="number soft">{format_text(_format_limit(check))}</td>'
+    return (
+        f"<tr><td>{badge}</td><td>{format_text(rest)}</td>"
+        f'<td class="number">{format_text(format_value(float(f"{check.value:.3g}")))}</td>'
+        f"{limit if with_limit else ''}</tr>\n"
+    )
+
+
+def _format_limit(check: Check) -> str:
+    return f"{_SIGNS[check.comparison]} {format_value(check.limit)}"

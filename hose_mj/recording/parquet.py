@@ -9,20 +9,26 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet
 
 from hose_mj.errors import InputError
+from hose_mj.extras import require
 from hose_mj.recording.files import write_atomically
 
 Record = dict[str, Any]
-_ARROW_TYPES = {
-    bool: pa.bool_(),
-    int: pa.int64(),
-    float: pa.float64(),
-    str: pa.string(),
-}
+_ARROW_TYPES = {bool: "bool", int: "int64", float: "double", str: "string"}
+
+
+def load_pyarrow() -> Any:
+    """Returns pyarrow with its parts for CSV and Parquet; the extra `report` brings it.
+
+    Raises:
+        MissingExtra: it is not installed.
+    """
+    require("pyarrow", "writing tables")
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    return pyarrow
 
 
 def write_records(
@@ -50,20 +56,16 @@ def write_records(
     """
     rows = [{str(key): _to_plain(value) for key, value in record.items()} for record in records]
     table = make_table(rows, dict(types or {}), dict(metadata or {}))
-    sink = pa.BufferOutputStream()
-    pyarrow.parquet.write_table(table, sink, compression="zstd")
-    write_atomically(Path(parquet_path), sink.getvalue().to_pybytes())
+    _write_parquet(table, parquet_path)
     if csv_path is not None:
         text = io.BytesIO()
-        pyarrow.csv.write_csv(table, text)
+        load_pyarrow().csv.write_csv(table, text)
         write_atomically(Path(csv_path), text.getvalue())
 
 
 def write_columns(columns: Mapping[str, npt.NDArray[Any]], parquet_path: Path) -> None:
     """Writes one-dimensional arrays of equal length as columns; the file is replaced at once."""
-    sink = pa.BufferOutputStream()
-    pyarrow.parquet.write_table(pa.table(dict(columns)), sink, compression="zstd")
-    write_atomically(Path(parquet_path), sink.getvalue().to_pybytes())
+    _write_parquet(load_pyarrow().table(dict(columns)), parquet_path)
 
 
 def read_records(parquet_path: Path) -> tuple[list[Record], dict[str, str]]:
@@ -72,8 +74,9 @@ def read_records(parquet_path: Path) -> tuple[list[Record], dict[str, str]]:
     Raises:
         InputError: no such file, or not Parquet.
     """
+    pa = load_pyarrow()
     try:
-        table = pyarrow.parquet.read_table(Path(parquet_path))
+        table = pa.parquet.read_table(Path(parquet_path))
     except (OSError, pa.ArrowException) as error:
         raise InputError("Parquet file", str(parquet_path), "a readable Parquet file") from error
     metadata = {
@@ -84,8 +87,9 @@ def read_records(parquet_path: Path) -> tuple[list[Record], dict[str, str]]:
     return table.to_pylist(), metadata
 
 
-def make_table(rows: list[Record], types: dict[str, type], metadata: dict[str, str]) -> pa.Table:
+def make_table(rows: list[Record], types: dict[str, type], metadata: dict[str, str]) -> Any:
     """Builds the Arrow table of plain rows."""
+    pa = load_pyarrow()
     names = list(dict.fromkeys([key for row in rows for key in row] + list(types)))
     if not names:
         raise InputError("records", rows, "at least one record with one key, or `types`")
@@ -115,6 +119,13 @@ def find_type(name: str, values: list[Any], wanted: type | None = None) -> type:
     if wanted is not None and wanted not in _ARROW_TYPES:
         raise InputError(f"type of column {name!r}", wanted, valid)
     return wanted or (found.pop() if found else str)
+
+
+def _write_parquet(table: Any, path: Path) -> None:
+    pa = load_pyarrow()
+    sink = pa.BufferOutputStream()
+    pa.parquet.write_table(table, sink, compression="zstd")
+    write_atomically(Path(path), sink.getvalue().to_pybytes())
 
 
 def _to_plain(value: Any) -> Any:

@@ -8,8 +8,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from hose_mj.recording.stage import Stage
-from hose_mj.recording.world_episode import Outcome, Samples
+from hose_mj.recording.scene_description import SceneDescription
+from hose_mj.recording.world_episode import EpisodeEnding, Samples
 
 _RESERVED = 3  # begin, end, and the mark that nothing follows
 
@@ -17,15 +17,15 @@ _RESERVED = 3  # begin, end, and the mark that nothing follows
 class Sink(Protocol):
     """Takes an episode: `begin`, any number of `add`, `end`; then perhaps another."""
 
-    def begin(self, stage: Stage) -> None:
-        """Is told what is on stage."""
+    def begin(self, scene: SceneDescription) -> None:
+        """Is told what is to be seen."""
         ...
 
     def add(self, samples: Samples) -> None:
         """Takes the next stretch; never changed afterwards."""
         ...
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, ending: EpisodeEnding) -> None:
         """Is told how it ended."""
         ...
 
@@ -66,7 +66,7 @@ class Background:
         self._complained = False
         self._dropping = False
 
-    def begin(self, stage: Stage) -> None:
+    def begin(self, scene: SceneDescription) -> None:
         """Begins an episode."""
         if self._thread is not None:
             self._thread.join(self._patience if self.lossy else None)
@@ -79,7 +79,7 @@ class Background:
             target=self._work, args=[self._jobs], name=self._name, daemon=True
         )
         self._thread.start()
-        self._put(lambda: self._sink.begin(stage), must=True)
+        self._put(lambda: self._sink.begin(scene), must=True)
 
     def add(self, samples: Samples) -> None:
         """Adds a stretch."""
@@ -87,10 +87,10 @@ class Background:
             self._raise()
         self._put(lambda: self._sink.add(samples))
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, ending: EpisodeEnding) -> None:
         """Ends the episode; a lossless sink has taken all of it when this returns."""
         assert self._thread is not None, "begin() comes first"
-        self._put(lambda: self._sink.end(outcome), must=True)
+        self._put(lambda: self._sink.end(ending), must=True)
         self._put(None, must=True)
         self._thread.join(self._patience if self.lossy else None)
         if not self.lossy:

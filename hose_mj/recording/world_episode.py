@@ -1,4 +1,4 @@
-"""What happened in a world, in memory: the stage, samples over time, and how it ended.
+"""Holds what happened in a world, in memory: the scene, samples over time, and how it ended.
 
 Plain data, whatever simulated it; nothing here reads or writes a file. World frame, SI units.
 Samples are rows of one structured array: appending copies numbers and makes no objects.
@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 
 from hose_mj.errors import InputError
 from hose_mj.recording.episode import Array, check_name, check_rising, check_shape, lock_array
-from hose_mj.recording.stage import Stage
+from hose_mj.recording.scene_description import SceneDescription
 
 NO_TURN = -1
 """Turn of a sample of an episode that has none."""
 
 
-def make_row_type(stage: Stage) -> np.dtype[Any]:
+def make_row_type(scene: SceneDescription) -> np.dtype[Any]:
     """Returns the type of one sample's numbers.
 
     Fields: `time` (s), `turn`, `reward`; `positions` (B, 3) and `quaternions` (B, 4), w x y z, of
-    the stage's bodies; `hose` (P, 3) and `tension` (P,), N, along it; `control_points` (C, 3);
+    the scene's bodies; `hose` (P, 3) and `tension` (P,), N, along it; `control_points` (C, 3);
     `attachments` (N + 1, 3) and `forces` (N + 1, 3), N, on the hose, the tip's robot first and the
     source last; `margins` (M,), NaN where there is none.
     """
-    n_bodies, n_points, n_holds = len(stage.bodies), len(stage.arc_lengths), len(stage.robots) + 1
+    n_bodies, n_points, n_holds = len(scene.bodies), len(scene.arc_lengths), len(scene.robots) + 1
     single = np.float32
     return np.dtype(
         [
@@ -39,10 +39,10 @@ def make_row_type(stage: Stage) -> np.dtype[Any]:
             ("quaternions", single, (n_bodies, 4)),
             ("hose", single, (n_points, 3)),
             ("tension", single, (n_points,)),
-            ("control_points", single, (stage.n_control_points, 3)),
+            ("control_points", single, (scene.n_control_points, 3)),
             ("attachments", single, (n_holds, 3)),
             ("forces", single, (n_holds, 3)),
-            ("margins", np.float64, (len(stage.margins),)),
+            ("margins", np.float64, (len(scene.margins),)),
         ]
     )
 
@@ -81,18 +81,18 @@ class Samples:
 
     @property
     def times(self) -> Array:
-        """Simulated times (k,), s."""
+        """Returns the simulated times (k,), s."""
         return np.asarray(self.rows["time"], dtype=np.float64)
 
     @property
     def has_turns(self) -> bool:
-        """Whether agents move in turns that are counted."""
+        """Says whether agents move in turns that are counted."""
         return bool(self.rows["turn"][0] != NO_TURN)
 
 
 @dataclass(frozen=True, eq=False)
 class BreakMark:
-    """Where and when a constraint broke.
+    """A broken constraint: which, where and when.
 
     Attributes:
         kind: "stretch", "collision", ...
@@ -117,8 +117,8 @@ class BreakMark:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """How an episode ended: in words ("break", "goal", "time"), and the break if there was one."""
+class EpisodeEnding:
+    """An ending of an episode: in words ("break", "goal", "duration"), and the break if one was."""
 
     ended_by: str
     mark: BreakMark | None = None
@@ -128,12 +128,12 @@ class Outcome:
 class WorldEpisode:
     """A whole episode."""
 
-    stage: Stage
+    scene: SceneDescription
     samples: Samples
-    outcome: Outcome
+    ending: EpisodeEnding
 
     def __post_init__(self) -> None:
-        wanted = make_row_type(self.stage)
+        wanted = make_row_type(self.scene)
         if self.samples.rows.dtype != wanted:
             raise InputError("type of the samples", self.samples.rows.dtype, f"{wanted}")
 
@@ -142,7 +142,7 @@ class SampleBuffer:
     """Gathers samples in arrays that grow up to a bound.
 
     Args:
-        stage: what the samples are of.
+        scene: what the samples are of.
         most: samples kept at most. When they are reached, every second one is dropped and from then
             on only every second one kept, and so forth: a long episode is kept whole, coarser, and
             its last sample in any case.
@@ -151,10 +151,10 @@ class SampleBuffer:
         InputError: fewer than 2 samples.
     """
 
-    def __init__(self, stage: Stage, most: int = 20_000) -> None:
+    def __init__(self, scene: SceneDescription, most: int = 20_000) -> None:
         if most < 2:
             raise InputError("most", most, "a whole number, at least 2")
-        self._type, self._most = make_row_type(stage), most
+        self._type, self._most = make_row_type(scene), most
         self._grow(min(64, most))
         self._texts: list[tuple[str, str, str]] = []
         self._stride, self._seen = 1, 0
@@ -164,7 +164,7 @@ class SampleBuffer:
 
     @property
     def is_full(self) -> bool:
-        """Whether another sample would make it coarser."""
+        """Says whether another sample would make it coarser."""
         return len(self) >= self._most
 
     def append(self, owner: str = "", vetoed: str = "", event: str = "", **numbers: Any) -> None:

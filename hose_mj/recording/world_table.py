@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 
 from hose_mj.recording.files import write_atomically
+from hose_mj.recording.parquet import load_pyarrow
 from hose_mj.recording.world_episode import NO_TURN, WorldEpisode
 
 _AXES = "xyz"
@@ -23,28 +22,28 @@ def write_csv(path: Path, episode: WorldEpisode) -> None:
     the force on the hose there (`_N`), the source's likewise; the least and largest tension of the
     hose; each margin with its unit. An empty field is a margin that has no value.
     """
-    out = io.BytesIO()
-    pyarrow.csv.write_csv(pa.table(make_columns(episode)), out)
+    pa, out = load_pyarrow(), io.BytesIO()
+    pa.csv.write_csv(pa.table(make_columns(episode)), out)
     write_atomically(Path(path), out.getvalue())
 
 
 def make_columns(episode: WorldEpisode) -> dict[str, Any]:
     """Returns the columns by name, in order."""
-    stage, samples = episode.stage, episode.samples
+    pa, scene, samples = load_pyarrow(), episode.scene, episode.samples
     rows = samples.rows
     columns: dict[str, Any] = {"time_s": samples.times}
     if samples.has_turns:
         columns["turn"] = pa.array(rows["turn"], mask=rows["turn"] == NO_TURN)
     columns |= {"owner": samples.owners, "vetoed": samples.vetoed, "events": samples.events}
     columns["reward"] = rows["reward"]
-    for i, name in enumerate((*stage.robots, "source")):
+    for i, name in enumerate((*scene.robots, "source")):
         for k, axis in enumerate(_AXES):
             columns[f"{name} {axis}_m"] = rows["attachments"][:, i, k]
         for k, axis in enumerate(_AXES):
             columns[f"{name} force_{axis}_N"] = rows["forces"][:, i, k]
     columns["tension_min_N"] = rows["tension"].min(axis=1)
     columns["tension_max_N"] = rows["tension"].max(axis=1)
-    for i, margin in enumerate(stage.margins):
+    for i, margin in enumerate(scene.margins):
         values = rows["margins"][:, i]
         columns[f"margin {margin.name}_{margin.unit}"] = pa.array(values, mask=np.isnan(values))
     return {

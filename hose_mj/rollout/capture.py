@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from hose_mj.hoses.protocol import Array
+from hose_mj.recording.scene_description import SceneDescription
 from hose_mj.recording.sinks import Sink
-from hose_mj.recording.stage import Stage
 from hose_mj.recording.world_episode import (
     NO_TURN,
     BreakMark,
-    Outcome,
+    EpisodeEnding,
     SampleBuffer,
     WorldEpisode,
 )
@@ -34,7 +34,7 @@ class Capture:
         n_points: points along the hose.
 
     Attributes:
-        stage: of the running episode.
+        scene: of the running episode.
     """
 
     def __init__(
@@ -46,29 +46,29 @@ class Capture:
     ) -> None:
         self._sinks, self._keep, self._most, self._n_points = tuple(sinks), keep, most, n_points
         self._is_live = any(getattr(sink, "lossy", False) for sink in sinks)
-        self.stage: Stage | None = None
+        self.scene: SceneDescription | None = None
         self._cast: Cast | None = None
         self._reader: HoseReader | None = None
         self._chunk: SampleBuffer | None = None
         self._kept: SampleBuffer | None = None
-        self._outcome: Outcome | None = None
+        self._outcome: EpisodeEnding | None = None
 
     def start(
         self, world: World, monitor: Any | None, settings: Mapping[str, Any] | None = None
     ) -> None:
-        """Begins an episode; nothing is recorded yet but the stage.
+        """Begins an episode; nothing is recorded yet but the scene.
 
         The world is read once for nothing, so that what numba compiles when it is first called is
         compiled before the episode runs.
         """
-        self.stage, self._cast = make_stage(world, monitor, settings or {}, self._n_points)
-        self._reader = HoseReader(world, self.stage.arc_lengths)
-        self._chunk = SampleBuffer(self.stage, LIVE_CHUNK if self._is_live else CHUNK)
-        self._kept = SampleBuffer(self.stage, self._most) if self._keep else None
+        self.scene, self._cast = make_stage(world, monitor, settings or {}, self._n_points)
+        self._reader = HoseReader(world, self.scene.arc_lengths)
+        self._chunk = SampleBuffer(self.scene, LIVE_CHUNK if self._is_live else CHUNK)
+        self._kept = SampleBuffer(self.scene, self._most) if self._keep else None
         self._outcome = None
         self._read(world)
         for sink in self._sinks:
-            sink.begin(self.stage)
+            sink.begin(self.scene)
 
     def sample(
         self, world: World, monitor: Any | None, info: Mapping[str, Any] | None = None
@@ -106,10 +106,10 @@ class Capture:
             outcome: has `ended_by`, a text, and `broken`, a `Break` or None; None if the episode
                 was stopped.
         """
-        if self.stage is None or self._outcome is not None:
+        if self.scene is None or self._outcome is not None:
             return
         mark = None if outcome is None else make_mark(outcome.broken)
-        self._outcome = Outcome("stopped" if outcome is None else outcome.ended_by, mark)
+        self._outcome = EpisodeEnding("stopped" if outcome is None else outcome.ended_by, mark)
         self._hand_over()
         for sink in self._sinks:
             sink.end(self._outcome)
@@ -117,8 +117,10 @@ class Capture:
     def episode(self) -> WorldEpisode:
         """Returns the episode that has ended, where `keep` was asked for and there are samples."""
         assert self._kept is not None, "made with keep=True, and started"
-        assert self.stage is not None
-        return WorldEpisode(self.stage, self._kept.copy(), self._outcome or Outcome("running"))
+        assert self.scene is not None
+        return WorldEpisode(
+            self.scene, self._kept.copy(), self._outcome or EpisodeEnding("running")
+        )
 
     def __enter__(self) -> Capture:
         return self
@@ -128,7 +130,7 @@ class Capture:
 
     def _read(self, world: World) -> dict[str, Array]:
         """Returns what a sample holds of the world as it stands."""
-        assert self.stage is not None
+        assert self.scene is not None
         assert self._cast is not None
         assert self._reader is not None
         control_points, hose = self._reader.read(world)
@@ -137,7 +139,7 @@ class Capture:
             "quaternions": world.data.xquat[self._cast.bodies],
             "hose": hose,
             "control_points": control_points,
-            "tension": world.tension(self.stage.arc_lengths),
+            "tension": world.tension(self.scene.arc_lengths),
             "attachments": world.site_positions(),
             "forces": world.attachment_forces(),
         }

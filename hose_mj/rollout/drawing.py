@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hose_mj.hoses.protocol import Array
-from hose_mj.recording.tension import color_tension
+from hose_mj.recording.palette import color_tension
 from hose_mj.world.world import World
 
 N_PIECES = 80

@@ -1,4 +1,4 @@
-"""Makes the `Stage` of a world: its geoms with their colours, what moves, what is watched."""
+"""Describes the scene of a world: its geoms with their colours, what moves, what is watched."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 
 from hose_mj.hoses.geds.basis import DEGREE, make_knots
 from hose_mj.hoses.protocol import Array
-from hose_mj.recording.stage import WORLD, Geom, Margin, Rgba, Stage
+from hose_mj.recording.scene_description import WORLD, Geom, Margin, Rgba, SceneDescription
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.world import World
 
@@ -104,8 +104,8 @@ class Cast:
 
 def make_stage(
     world: World, monitor: Any | None, settings: Mapping[str, Any], n_points: int = N_POINTS
-) -> tuple[Stage, Cast]:
-    """Makes the stage of a world as it stands now.
+) -> tuple[SceneDescription, Cast]:
+    """Describes the scene of a world as it stands now.
 
     Args:
         world: after its reset.
@@ -116,7 +116,7 @@ def make_stage(
     cast, scene = Cast(world), world.scene
     geoms = tuple(cast.make_geom(i) for i in cast.list_geoms())
     low, high = find_space(world, geoms)
-    stage = Stage(
+    stage = SceneDescription(
         name=world.hose_model,
         title=f"{scene.path.stem}, {world.hose_model}",
         geoms=geoms,

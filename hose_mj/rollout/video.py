@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hose_mj.errors import HoseError, InputError
+from hose_mj.extras import require
 from hose_mj.hoses.protocol import Array
 from hose_mj.recording.files import make_temp_beside, replace_atomically
-from hose_mj.recording.tension import color_tension
+from hose_mj.recording.palette import color_tension
 from hose_mj.recording.world_episode import WorldEpisode
 from hose_mj.scenes.mjcf.scene import Scene
 
@@ -43,16 +44,16 @@ def write_mp4(
 
     Raises:
         InputError: a size or rate out of range, or no such camera.
-        HoseError: the extra `video` is not installed, or no OpenGL context can be had.
+        MissingExtra: the extra `video` is not installed.
+        HoseError: no OpenGL context can be had.
     """
     if any(part % 16 or part <= 0 for part in size):
         raise InputError("size", size, "width and height, multiples of 16")
     if not 1 <= fps <= 120:
         raise InputError("fps", fps, "1 to 120")
-    try:
-        import imageio_ffmpeg
-    except ImportError as error:
-        raise HoseError('a film needs imageio-ffmpeg: pip install "hose-mj[video]"') from error
+    require("imageio_ffmpeg", "rendering films")
+    import imageio_ffmpeg
+
     temp = make_temp_beside(Path(path))
     try:
         frames = render_frames(episode, scene, size, fps, camera)
@@ -123,7 +124,7 @@ class Puppets:
         self.data = mujoco.MjData(model)
         mujoco.mj_forward(model, self.data)
         self._model, self._episode = model, episode
-        self._numbers = [model.body(name).id for name in episode.stage.bodies]
+        self._numbers = [model.body(name).id for name in episode.scene.bodies]
 
     def pose(self, k: int) -> None:
         """Moves the bodies to where they were in sample k, with all that is fixed to them."""
@@ -144,13 +145,13 @@ class Puppets:
     def draw_hose(self, scene: mujoco.MjvScene, k: int) -> None:
         """Adds the hose of sample k to a picture, and the break once it has happened."""
         episode, rows = self._episode, self._episode.samples.rows
-        stage, points = episode.stage, rows["hose"][k].astype(np.float64)
+        stage, points = episode.scene, rows["hose"][k].astype(np.float64)
         middle = 0.5 * (rows["tension"][k][:-1] + rows["tension"][k][1:])
         colors = color_tension(middle, stage.tension_limit) / 255.0
         for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
             geom = add_geom(scene, (*color, 1.0))
             mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, stage.hose_radius, start, end)
-        mark = episode.outcome.mark
+        mark = episode.ending.mark
         if mark is not None and rows["time"][k] >= mark.time:
             top = mark.place + np.array([0.0, 0.0, 0.16 * stage.size])
             geom, radius = add_geom(scene, _BREAK_COLOR), 0.005 * stage.size

@@ -7,24 +7,24 @@ import pytest
 from hose_mj.cli.main import main
 from hose_mj.recording import rerun
 from hose_mj.recording.rerun import write_world_recording
-from hose_mj.recording.stage import Geom, Stage
-from hose_mj.recording.world_episode import BreakMark, Outcome, SampleBuffer, WorldEpisode
+from hose_mj.recording.scene_description import Geom, SceneDescription
+from hose_mj.recording.world_episode import BreakMark, EpisodeEnding, SampleBuffer, WorldEpisode
 
 
 @pytest.fixture
 def recording(tmp_path):
     goal = Geom("goal", "sphere", [0.1, 0, 0], (0, 255, 0, 255), -1, [1, 0, 0], [1, 0, 0, 0])
     bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
-    stage = Stage(
+    scene = SceneDescription(
         *("geds", "two points", (), (), (), goal, [0.0, 1.0], 0.01, 5.0, (), 0),
         *([0, 0, 0], [1, 1, 1], bounds, [0, 0, 0]),
     )
-    buffer = SampleBuffer(stage)
+    buffer = SampleBuffer(scene)
     for time in (0.0, 1.0, 2.0):
         buffer.append(time=time, hose=[[0, 0, 0], [1, 0, 0]])
-    outcome = Outcome("break", BreakMark("stretch", 1.25, [1, 0, 0], "the hose tore"))
+    ending = EpisodeEnding("break", BreakMark("stretch", 1.25, [1, 0, 0], "the hose tore"))
     path = tmp_path / "runs" / "recordings" / "a.rrd"
-    write_world_recording(path, [WorldEpisode(stage, buffer.copy(), outcome)])
+    write_world_recording(path, [WorldEpisode(scene, buffer.copy(), ending)])
     return path
 
 

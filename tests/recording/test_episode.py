@@ -3,7 +3,7 @@ import pytest
 
 from hose_mj.errors import InputError
 from hose_mj.recording.episode import HoseTrack, Scene, Series
-from hose_mj.recording.plots.palette import COLORS, find_color, find_model
+from hose_mj.recording.palette import COLORS, find_color, find_model
 
 
 def make_track(**changes):

@@ -5,8 +5,7 @@ import pytest
 
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
-from hose_mj.recording.page import Page, Picture
-from hose_mj.recording.page_checks import group_checks
+from hose_mj.recording.page import Page, Picture, group_checks
 from hose_mj.recording.plots.api import plot_series
 
 NASTY = "<script>alert('&\"')</script>"
@@ -85,6 +84,11 @@ def test_checks_that_share_a_part_of_their_names_stand_together():
         "error": ["m", "n"],
         "Others": ["alone, z", "last"],
     }
+
+
+def test_a_phone_shows_the_page_at_its_own_width(document):
+    viewport = parse(document).find("head/meta[@name='viewport']")
+    assert viewport.get("content") == "width=device-width, initial-scale=1"
 
 
 def test_running_text_marks_code_and_strong():

@@ -2,17 +2,18 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.recording import viewer
 from hose_mj.recording.episode import HoseTrack, Scene, Series
-from hose_mj.recording.framing import compute_framing, round_spacing
-from hose_mj.recording.plots.palette import COLORS
-from hose_mj.recording.rerun import read_recording, take_screenshot, write_recording
+from hose_mj.recording.palette import COLORS
+from hose_mj.recording.rerun import read_recording, take_screenshot, viewer, write_recording
+from hose_mj.recording.rerun.comparison import compute_framing
+from hose_mj.recording.rerun.parts import round_spacing
 
 
 def make_swing(name, lag=0.0, sideways=0.0, n_times=30):
@@ -171,3 +172,44 @@ def test_a_screenshot_of_no_recording_starts_no_viewer(tmp_path, monkeypatch):
     with pytest.raises(InputError):
         take_screenshot(tmp_path / "absent.rrd", tmp_path / "a.png")
     assert not os.listdir(tmp_path)
+
+
+FULL_DISK = """
+import resource, signal, sys, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_world_episode import make_scene
+from hose_mj.recording.rerun import open_sinks
+from hose_mj.recording.world_episode import EpisodeEnding, SampleBuffer
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+scene = make_scene()
+(sink,) = open_sinks(save=Path({path!r}))
+sink.begin(scene)
+buffer = SampleBuffer(scene)
+for k in range(500):
+    buffer.append(time=0.01 * k)
+sink.add(buffer.take())
+try:
+    sink.end(EpisodeEnding("stopped"))
+except OSError as error:
+    print(error.strerror)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of files are POSIX's")
+def test_a_full_disk_is_an_error_of_the_system_and_hangs_nothing(tmp_path):
+    path = tmp_path / "episode.rrd"
+    code = FULL_DISK.format(tests=str(Path(__file__).parent), path=str(path))
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout) == (0, "File too large\n"), done.stderr
+    assert not os.listdir(tmp_path)
+
+
+@pytest.mark.parametrize("module", ["rerun.experimental", "rerun.chunk"])
+def test_a_version_of_rerun_that_lacks_what_we_use_is_named(recording, monkeypatch, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(HoseError, match=rf"rerun .* has no {module}\."):
+        viewer.connect("") if module == "rerun.experimental" else read_recording(recording)

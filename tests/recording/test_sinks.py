@@ -4,20 +4,20 @@ import pytest
 
 from hose_mj.recording.sinks import Background
 
-STAGE, SAMPLES, OUTCOME = object(), object(), object()
+SCENE, SAMPLES, ENDING = object(), object(), object()
 
 
 class Notes:
     def __init__(self):
         self.calls = []
 
-    def begin(self, stage):
+    def begin(self, scene):
         self.calls.append("begin")
 
     def add(self, samples):
         self.calls.append("add")
 
-    def end(self, outcome):
+    def end(self, ending):
         self.calls.append("end")
 
 
@@ -37,10 +37,10 @@ class Failing(Notes):
 
 
 def play(background, n):
-    background.begin(STAGE)
+    background.begin(SCENE)
     for _ in range(n):
         background.add(SAMPLES)
-    background.end(OUTCOME)
+    background.end(ENDING)
 
 
 def test_a_lossless_sink_gets_everything_in_order_also_twice():
@@ -68,11 +68,11 @@ def test_a_sink_that_hangs_forever_does_not_hold_up_the_run(capsys):
 def test_a_slow_sink_misses_stretches_but_hears_the_end():
     notes = Hanging()
     background = Background(notes, "viewer", lossy=True, most=4, patience_s=30.0)
-    background.begin(STAGE)
+    background.begin(SCENE)
     for _ in range(50):
         background.add(SAMPLES)
     notes.release.set()
-    background.end(OUTCOME)
+    background.end(ENDING)
     assert notes.calls[0] == "begin"
     assert notes.calls[-1] == "end"
     assert len(notes.calls) < 52

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
-from hose_mj.recording.stage import Geom, Margin, Stage
-from hose_mj.recording.tension import color_tension
+from hose_mj.recording.palette import color_tension
+from hose_mj.recording.scene_description import Geom, Margin, SceneDescription
 from hose_mj.recording.world_episode import BreakMark, SampleBuffer
 
 
@@ -17,16 +17,16 @@ def make_geom(**changed):
     return Geom(**(values | changed))
 
 
-def make_stage(**changed):
+def make_scene(**changed):
     values = {
-        "name": "geds", "title": "A stage", "geoms": (make_geom(),), "bodies": ("puck",),
+        "name": "geds", "title": "A scene", "geoms": (make_geom(),), "bodies": ("puck",),
         "robots": ("robot0",), "goal": make_geom(name="goal", body=-1), "arc_lengths": [0, 0.5, 1],
         "hose_radius": 0.01, "tension_limit": 10.0,
         "margins": (Margin("stretch 0", "stretch", "N"),),
         "n_control_points": 4, "low": [0, 0, 0], "high": [1, 1, 0.1], "source": [0, 0, 0],
         "bounds": [[0, 0, -np.inf], [1, 1, np.inf]],
     }  # fmt: skip
-    return Stage(**(values | changed))
+    return SceneDescription(**(values | changed))
 
 
 @pytest.mark.parametrize(
@@ -37,21 +37,21 @@ def make_stage(**changed):
         (make_geom, {"color": (256, 0, 0, 0)}, "ball.*color"),
         (make_geom, {"kind": "mesh"}, "ball.*vertices"),
         (make_geom, {"kind": "mesh", "vertices": np.eye(3), "faces": [[0, 1, 3]]}, "ball.*faces"),
-        (make_stage, {"geoms": (make_geom(body=1),)}, "body of geom 'ball'"),
-        (make_stage, {"geoms": (make_geom(), make_geom())}, "geoms.*ball"),
-        (make_stage, {"tension_limit": 0.0}, "tension_limit"),
-        (make_stage, {"arc_lengths": [0, 0]}, "arc_lengths"),
-        (make_stage, {"high": [0, 0, 0]}, "low"),
+        (make_scene, {"geoms": (make_geom(body=1),)}, "body of geom 'ball'"),
+        (make_scene, {"geoms": (make_geom(), make_geom())}, "geoms.*ball"),
+        (make_scene, {"tension_limit": 0.0}, "tension_limit"),
+        (make_scene, {"arc_lengths": [0, 0]}, "arc_lengths"),
+        (make_scene, {"high": [0, 0, 0]}, "low"),
     ],
 )
-def test_what_cannot_be_on_stage_is_named(make, changed, message):
+def test_what_cannot_be_in_a_scene_is_named(make, changed, message):
     with pytest.raises(InputError, match=message):
         make(**changed)
 
 
 @given(st.integers(2, 20), st.integers(1, 200))
 def test_a_long_episode_is_kept_whole_but_coarser(most, n):
-    buffer = SampleBuffer(make_stage(), most)
+    buffer = SampleBuffer(make_scene(), most)
     for k in range(n):
         buffer.append(event=str(k), time=0.1 * k)
     samples = buffer.copy()
@@ -69,7 +69,7 @@ def test_a_long_episode_is_kept_whole_but_coarser(most, n):
 
 
 def test_a_second_sample_of_one_time_replaces_the_first():
-    buffer = SampleBuffer(make_stage())
+    buffer = SampleBuffer(make_scene())
     buffer.append("a", time=0.0)
     buffer.append("b", time=0.1, reward=1.0)
     buffer.append("c", time=0.1, reward=2.0)
@@ -80,7 +80,7 @@ def test_a_second_sample_of_one_time_replaces_the_first():
 
 
 def test_a_sample_that_is_not_finite_is_named_but_for_margins():
-    buffer = SampleBuffer(make_stage())
+    buffer = SampleBuffer(make_scene())
     buffer.append(time=0.0, margins=[np.nan])
     buffer.copy()
     buffer.append(time=0.1, tension=[0.0, np.inf, 0.0])

@@ -15,8 +15,8 @@ from hose_mj.recording.rerun import (
     take_screenshot,
     write_world_recording,
 )
-from hose_mj.recording.rerun.live import check_url
-from hose_mj.recording.rerun.world_stage import rotate
+from hose_mj.recording.rerun.episodes import check_url
+from hose_mj.recording.rerun.world_scene import rotate
 from hose_mj.recording.world_table import write_csv
 from hose_mj.rollout.capture import Capture
 from hose_mj.rollout.staging import Cast, HoseReader, make_stage
@@ -77,7 +77,7 @@ def test_samples_are_what_the_world_was(episode):
     np.testing.assert_allclose(rows["margins"][:, 0], 10.0 - 4.0 * times)
     assert np.all(np.isnan(rows["margins"][:, 1]))
     assert episode.samples.vetoed[3] == "north, east"
-    assert episode.outcome.mark.time == 2.5
+    assert episode.ending.mark.time == 2.5
 
 
 def test_a_recording_reads_back(recording):
@@ -120,7 +120,7 @@ def test_a_recording_knows_its_break(recording):
 def test_two_models_are_overlaid(episode, tmp_path):
     from dataclasses import replace
 
-    other = replace(episode, stage=replace(episode.stage, name="cable"))
+    other = replace(episode, scene=replace(episode.scene, name="cable"))
     write_world_recording(tmp_path / "both.rrd", [episode, other])
     entities = read_recording(tmp_path / "both.rrd")["entities"]
     assert {"/world/rails/hose", "/world/cable/hose"} <= set(entities)

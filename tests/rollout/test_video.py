@@ -1,10 +1,10 @@
-import builtins
+import sys
 
 import numpy as np
 import pytest
 
 from hose_mj.errors import HoseError, InputError
-from hose_mj.recording.tension import color_tension
+from hose_mj.recording.palette import color_tension
 from hose_mj.rollout import video
 
 
@@ -40,14 +40,7 @@ def test_bodies_stand_where_the_samples_have_them(episode, floor):
 
 
 def test_a_film_without_its_extra_is_one_clear_message(episode, floor, tmp_path, monkeypatch):
-    real = builtins.__import__
-
-    def refuse(name, *rest):
-        if name == "imageio_ffmpeg":
-            raise ImportError(name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(HoseError, match=r"hose-mj\[video\]"):
         video.write_mp4(tmp_path / "a.mp4", episode, floor)
     assert not list(tmp_path.iterdir())

@@ -13,9 +13,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import PercentFormatter
 
-from hose_mj.recording.plots.axes import check_some
-from hose_mj.recording.plots.palette import find_color, format_hex
-from hose_mj.recording.plots.style import SOFT, add_legend, encode_png, make_figure
+from hose_mj.recording.palette import find_color, format_hex
+from hose_mj.recording.plots.style import (
+    SOFT,
+    add_legend,
+    check_some,
+    encode_png,
+    make_figure,
+    write_note,
+)
 
 HEIGHT = 0.38
 """Room of an item over all its bars, in inches."""
@@ -101,12 +107,7 @@ def _draw_panel(axes: Axes, panel: BarPanel, n_items: int) -> None:
         # An interval may not leave the shares that exist.
         left = np.minimum(intervals, values)[known]
         right = np.minimum(intervals, 1.0 - values)[known]
-        style: dict[str, Any] = {
-            "fmt": "none",
-            "ecolor": "#333333",
-            "elinewidth": 0.9,
-            "capsize": 1.6,
-        }
+        style: Any = {"fmt": "none", "ecolor": "#333333", "elinewidth": 0.9, "capsize": 1.6}
         axes.errorbar(values[known], places[known], xerr=[left, right], **style)
         for bar, y in zip(bars, places, strict=True):
             if bar.reference is not None:
@@ -122,13 +123,5 @@ def _draw_panel(axes: Axes, panel: BarPanel, n_items: int) -> None:
     if panel.guide is not None:
         at, name = panel.guide
         axes.axvline(at, color=SOFT, lw=0.9, ls=(0, (4, 3)), zorder=3)
-        axes.annotate(
-            name,
-            (at, 0.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, -26),
-            textcoords="offset points",
-            ha="center",
-            color=SOFT,
-            fontsize=7.5,
-        )
+        where: Any = {"xycoords": ("data", "axes fraction"), "xytext": (0, -26), "ha": "center"}
+        write_note(axes, name, (at, 0.0), **where)

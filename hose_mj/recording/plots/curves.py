@@ -1,33 +1,37 @@
-"""Plots of curves: convergence with measured orders, and numbers over time."""
+"""Plots of curves: convergence with orders, numbers over time, learning, twist along a hose."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, PercentFormatter
 from numpy.typing import ArrayLike
 
+from hose_mj.errors import InputError
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.axes import (
+from hose_mj.recording.palette import LIMIT, OTHERS, darken, find_model, format_hex, name_model
+from hose_mj.recording.plots.labels import label_line_ends
+from hose_mj.recording.plots.style import (
+    DASHES,
+    SOFT,
+    Look,
+    check_curve,
     check_pair,
     check_some,
+    choose_looks,
     draw_slopes,
+    encode_png,
     format_seconds,
     keep_positive,
     label_resolutions,
+    make_axes,
+    make_figure,
     set_log,
 )
-from hose_mj.recording.plots.labels import label_line_ends
-from hose_mj.recording.plots.palette import (
-    LIMIT,
-    OTHERS,
-    darken,
-    find_model,
-    format_hex,
-    name_model,
-)
-from hose_mj.recording.plots.style import Look, choose_looks, encode_png, make_axes
 
 _MARKERS = "osD^v"
 
@@ -41,7 +45,7 @@ def plot_convergence(
     ylabel: str = "error",
     in_seconds: bool = False,
 ) -> bytes:
-    """Error against resolution, both logarithmic; each line's name and slope stand at its end.
+    """Draws error over resolution, both logarithmic; each line's name and slope stand at its end.
 
     Args:
         title: text.
@@ -92,7 +96,7 @@ def plot_series(
     limits: Mapping[str, float] | None = None,
     logy: bool = False,
 ) -> bytes:
-    """Numbers over time, each line named at its end; `limits` are drawn across with their names."""
+    """Draws numbers over time, lines named at their ends; `limits` go across with their names."""
     check_some("groups", groups)
     looks = choose_looks(list(groups))
     ends, ink = [], format_hex(LIMIT)
@@ -140,3 +144,137 @@ def _choose_looks(labels: Sequence[str]) -> dict[str, Look]:
         )
         for place, (label, kind) in enumerate(zip(labels, kinds, strict=True))
     }
+
+
+def plot_twist(
+    title: str,
+    arc_lengths: ArrayLike,
+    shape: ArrayLike,
+    twists: Mapping[str, ArrayLike],
+    knots: ArrayLike = (),
+) -> bytes:
+    """Draws the shape above, the twist below, over one axis of arc length.
+
+    Args:
+        title: text.
+        arc_lengths: (k,), m.
+        shape: the centre line there (k, 3), m, of which y and z are drawn.
+        twists: label to twist (k,), rad/m.
+        knots: arc lengths marked by thin lines.
+
+    Raises:
+        InputError: nothing to draw, or shapes that do not fit.
+    """
+    check_some("twists", twists)
+    points = check_curve("shape", shape)[0]
+    looks = choose_looks(list(twists))
+    ends = []
+    with make_figure((7.6, 5.0), title) as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+        for name, dim, dashes in (("y", 1, "-"), ("z", 2, (0, (5, 2)))):
+            s, height = check_pair(name, arc_lengths, points[:, dim])
+            above.plot(s, height, color="#444444", ls=dashes)
+            ends.append((float(height[-1]), name, "#444444"))
+        above.set_ylabel("shape (m)")
+        figure.draw_without_rendering()
+        label_line_ends(above, ends)
+        ends = []
+        for label, values in twists.items():
+            s, twist = check_pair(label, arc_lengths, values)
+            below.plot(s, twist, color=looks[label].color, ls=looks[label].dashes)
+            ends.append((float(twist[-1]), name_model(label), looks[label].ink))
+        for knot in np.ravel(knots):
+            below.axvline(knot, color=SOFT, lw=0.5, ls=(0, (1, 3)), zorder=0)
+        below.set_xlim(float(np.min(s)), float(np.max(s)))
+        below.set_xlabel("arc length (m)")
+        below.set_ylabel("twist (rad/m)")
+        figure.draw_without_rendering()
+        label_line_ends(below, ends)
+        return encode_png(figure)
+
+
+PANEL = (4.6, 3.5)
+"""Width and height of a panel (inches)."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line; values that are not finite are left out.
+
+    Attributes:
+        x: (k,).
+        middle: (k,).
+        low, high: its band (k,).
+    """
+
+    x: ArrayLike
+    middle: ArrayLike
+    low: ArrayLike
+    high: ArrayLike
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One measure of all learners.
+
+    Attributes:
+        name: of the measure, with its unit.
+        curves: by label; the same labels in all panels.
+        scale: "share" from 0 to 1, "log" or "linear".
+    """
+
+    name: str
+    curves: Mapping[str, Curve]
+    scale: Literal["share", "log", "linear"] = "linear"
+
+
+def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:
+    """Draws panels side by side; each line's name stands at its end, in the last panel.
+
+    Each line has dashes of its own, so that one shows through another that lies over it.
+
+    Raises:
+        InputError: no panel, one without curves, or arrays of different lengths.
+    """
+    check_some("panels", panels)
+    labels = list(dict.fromkeys(label for panel in panels for label in panel.curves))
+    check_some("curves", labels)
+    looks = choose_looks(labels)
+    width, height = PANEL
+    with make_figure((width * len(panels) + 1.2, height), title) as figure:
+        rows = np.atleast_1d(figure.subplots(1, len(panels)))
+        ends = []
+        for axes, panel in zip(rows, panels, strict=True):
+            for place, (label, curve) in enumerate(panel.curves.items()):
+                x, middle, low, high = _check_curve(label, curve)
+                look = looks[label]
+                axes.fill_between(x, low, high, color=look.color, alpha=0.18, lw=0.0)
+                axes.plot(x, middle, color=look.color, ls=DASHES[place % len(DASHES)])
+                if axes is rows[-1] and len(middle):
+                    ends.append((float(middle[-1]), label, look.ink))
+            _set_axes(axes, xlabel, panel)
+        figure.draw_without_rendering()
+        label_line_ends(rows[-1], ends)
+        return encode_png(figure)
+
+
+def _set_axes(axes: Axes, xlabel: str, panel: Panel) -> None:
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(panel.name)
+    axes.set_xlim(0.0, max(float(np.max(curve.x)) for curve in panel.curves.values()))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    if panel.scale == "log":
+        set_log(axes, x=False, y=True)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+    elif panel.scale == "share":
+        axes.set_ylim(-0.02, 1.02)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+
+
+def _check_curve(label: str, curve: Curve) -> list[Array]:
+    parts = [np.asarray(part, float) for part in (curve.x, curve.middle, curve.low, curve.high)]
+    if any(part.ndim != 1 or part.shape != parts[0].shape for part in parts):
+        shapes = tuple(part.shape for part in parts)
+        raise InputError(f"shapes of {label!r}", shapes, "four of shape (k,)")
+    kept = np.all(np.isfinite(parts), axis=0)
+    return [part[kept] for part in parts]

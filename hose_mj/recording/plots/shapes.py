@@ -15,19 +15,24 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.axes import PLAIN, check_curve, check_some, choose_length_unit
-from hose_mj.recording.plots.labels import Label, label_points
-from hose_mj.recording.plots.palette import (
-    COLORS,
+from hose_mj.recording.palette import (
     darken,
     find_color,
-    find_model,
     format_hex,
     lighten,
     name_model,
 )
+from hose_mj.recording.plots.labels import Label, label_points
 from hose_mj.recording.plots.statics import shade
-from hose_mj.recording.plots.style import add_legend, encode_png, make_axes
+from hose_mj.recording.plots.style import (
+    PLAIN,
+    add_legend,
+    check_curve,
+    check_some,
+    choose_length_unit,
+    encode_png,
+    make_axes,
+)
 
 _WIDTHS = (6.0, 2.6, 1.0, 0.8)
 """Line widths (points) of models on top of each other, the first lowest."""
@@ -57,7 +62,7 @@ def plot_shapes(
     times: Sequence[float] | None = None,
     outlines: Sequence[Array] = (),
 ) -> bytes:
-    """Hoses seen along one axis, to scale, several models over each other.
+    """Draws hoses seen along one axis, to scale, several models over each other.
 
     Args:
         title: text.
@@ -95,10 +100,10 @@ def draw_shapes(
         base = 0.45 if rank == 0 and len(stacks) > 1 else 0.0
         for k, shape in enumerate(factor * stack):
             age = 1.0 - (k + 1) / len(stack)
-            color = format_hex(lighten(find_color(label), base + (0.75 - base) * age))
+            color = format_hex(lighten(find_color(label, rank), base + (0.75 - base) * age))
             order = 2 + k + rank / 8
             axes.plot(*shape.T, color=color, lw=width, solid_capstyle="round", zorder=order)
-        full = format_hex(lighten(find_color(label), base))
+        full = format_hex(lighten(find_color(label, rank), base))
         handles.append(Line2D([], [], color=full, lw=width, label=name_model(label)))
     _set_view(axes, factor * every, unit, plane)
     return handles
@@ -124,7 +129,7 @@ def label_snapshots(
 
 
 def plot_fan(title: str, fans: Sequence[Fan], plane: tuple[int, int] = (0, 2)) -> bytes:
-    """Equilibria over a parameter, to scale; names of the parameters stand at the tips."""
+    """Draws equilibria over a parameter, to scale; names of the parameters stand at the tips."""
     check_some("fans", fans)
     stacks = [_flatten(fan.curves, plane) for fan in fans]
     every = np.concatenate([curve[0] for stack in stacks for curve in stack.values()])
@@ -132,20 +137,20 @@ def plot_fan(title: str, fans: Sequence[Fan], plane: tuple[int, int] = (0, 2)) -
     unit, factor = choose_length_unit(float(np.ptp(every, axis=0).max()))
     with make_axes(_wrap(title, size), (size[0], size[1] + 0.2 * len(fans))) as (figure, axes):
         handles, notes, lines = [], [], []
-        for fan, stack in zip(fans, stacks, strict=True):
-            model = find_model(fan.name) or ""
+        for place, (fan, stack) in enumerate(zip(fans, stacks, strict=True)):
             style: dict[str, Any] = {"ls": ":" if fan.dotted else "-", "zorder": 3 + fan.dotted}
             style["lw"] = 1.5 if fan.dotted else 3.0
+            plain = find_color(fan.name, place)
             for rank, (parameter, curve) in enumerate(stack.items()):
-                points = factor * curve[0]
-                color = format_hex(COLORS[model] if fan.dotted else shade(model, rank, len(stack)))
-                axes.plot(*points.T, color=color, solid_capstyle="round", **style)
+                points, color = factor * curve[0], shade(fan.name, rank, len(stack), place)
+                style["color"] = format_hex(plain if fan.dotted else color)
+                axes.plot(*points.T, solid_capstyle="round", **style)
                 lines.append((points[:, 0], points[:, 1]))
                 if not fan.dotted and parameter:
-                    ink = format_hex(darken(shade(model, rank, len(stack)), 0.3))
+                    ink = format_hex(darken(color, 0.3))
                     notes.append(Label(points[-1, 0], points[-1, 1], parameter, ink))
-            color = format_hex(find_color(fan.name))
-            handles.append(Line2D([], [], color=color, label=name_model(fan.name), **style))
+            style["color"] = format_hex(plain)
+            handles.append(Line2D([], [], label=name_model(fan.name), **style))
         _set_view(axes, factor * every, unit, plane)
         add_legend(figure, handles, columns=1)
         label_points(figure, axes, notes, lines)
@@ -183,7 +188,7 @@ def choose_label_point(stack: Array) -> int:
 
 
 def _list_corners(stacks: Mapping[str, Array]) -> list[Array]:
-    """All points drawn, (k, 2) each."""
+    """Returns all points drawn, (k, 2) each."""
     return [stack.reshape(-1, 2) for stack in stacks.values()]
 
 
@@ -195,7 +200,7 @@ def _flatten(curves: Mapping[str, ArrayLike], plane: tuple[int, int]) -> dict[st
 
 
 def _set_view(axes: Axes, points: Array, unit: str, plane: tuple[int, int]) -> None:
-    """Equal scales, and limits close about the points."""
+    """Sets equal scales, and limits close about the points."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 0.12 * float((high - low).max()) or 1.0)
     middle = 0.5 * (low + high)

@@ -11,25 +11,27 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter, NullLocator
 
-from hose_mj.recording.plots.axes import (
-    ERRORS,
-    PLAIN,
-    check_some,
-    draw_levels,
-    is_positive,
-    label_resolutions,
-)
-from hose_mj.recording.plots.labels import label_line_ends
-from hose_mj.recording.plots.palette import (
-    COLORS,
-    OTHERS,
+from hose_mj.recording.palette import (
     Rgb,
     darken,
+    find_color,
     format_hex,
     lighten,
     name_model,
 )
-from hose_mj.recording.plots.style import add_legend, choose_looks, encode_png, make_figure
+from hose_mj.recording.plots.labels import label_line_ends
+from hose_mj.recording.plots.style import (
+    ERRORS,
+    PLAIN,
+    add_legend,
+    check_some,
+    choose_looks,
+    draw_levels,
+    encode_png,
+    is_positive,
+    label_resolutions,
+    make_figure,
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class ErrorPoint:
 def plot_errors(
     title: str, points: Sequence[ErrorPoint], ylabel: str = "error (of the reference)"
 ) -> bytes:
-    """Error over resolution, both logarithmic, in panels that share the errors' axis.
+    """Draws error over resolution, both logarithmic, in panels that share the errors' axis.
 
     Filled marks on full lines are clamp-corrected or in no need of it, hollow ones on faint dotted
     lines as documented.
@@ -76,13 +78,16 @@ def plot_errors(
         return encode_png(figure)
 
 
-def shade(model: str, rank: int, n: int) -> Rgb:
-    """Returns the colour of the rank-th of n parameters: the model's, from pale to dark."""
-    color = COLORS.get(model, OTHERS[0])
+def shade(model: str, rank: int, n: int, place: int = 0) -> Rgb:
+    """Returns the colour of the rank-th of n parameters: the model's, from pale to dark.
+
+    A model without a colour of its own takes the spare one at `place`.
+    """
+    color = find_color(model, place)
     if n < 2:
         return color
-    place = rank / (n - 1)
-    return lighten(color, 0.5 - place) if place < 0.5 else darken(color, 0.9 * (place - 0.5))
+    share = rank / (n - 1)
+    return lighten(color, 0.5 - share) if share < 0.5 else darken(color, 0.9 * (share - 0.5))
 
 
 def _draw_panel(

@@ -1,4 +1,7 @@
-"""Work-precision plot: error over cost, each model by its best settings."""
+"""Work-precision plot: error over cost, each model by its best settings; alone or beside a motion.
+
+Arrows say how much more a peer costs at equal error.
+"""
 
 from __future__ import annotations
 
@@ -10,32 +13,40 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
+from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter
+from matplotlib.transforms import ScaledTranslation
+from numpy.typing import ArrayLike
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.axes import (
+from hose_mj.recording.palette import name_model
+from hose_mj.recording.plots.labels import Label, label_points
+from hose_mj.recording.plots.shapes import draw_shapes, label_snapshots
+from hose_mj.recording.plots.style import (
+    DPI,
     ERRORS,
+    HALO,
     PLAIN,
+    Look,
+    add_legend,
+    check_curve,
     check_some,
+    choose_looks,
     draw_levels,
+    encode_png,
     format_percent,
     format_seconds,
     is_positive,
-    set_log,
-)
-from hose_mj.recording.plots.gaps import Gap, draw_gap, trace_gap
-from hose_mj.recording.plots.labels import Label, label_points
-from hose_mj.recording.plots.palette import name_model
-from hose_mj.recording.plots.style import (
-    DPI,
-    SOFT,
-    Look,
-    add_legend,
-    choose_looks,
-    encode_png,
     make_axes,
+    make_figure,
+    set_log,
+    write_note,
 )
+
+OVERVIEW = (1600 / 150, 700 / 150)
+"""Size of the overview (inches)."""
+_SHIFT = 6.0
+"""Distance of an arrow from its level (points of length)."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +69,28 @@ class WorkPoint:
 
     @property
     def is_raw(self) -> bool:
-        """Whether this is a result before its clamp was corrected."""
+        """Says whether this is a result before its clamp was corrected."""
         return self.clamp_corrected is False and not self.model.startswith("geds")
 
 
+@dataclass(frozen=True)
+class Gap:
+    """An arrow that says what a peer costs more at equal error.
+
+    Attributes:
+        at_error: the level, as a fraction.
+        against: model id of the peer.
+        cost, cost_against: wall over simulated time of the two.
+    """
+
+    at_error: float
+    against: str
+    cost: float
+    cost_against: float
+
+
 def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()) -> bytes:
-    """Error against cost, both logarithmic; lower left is better.
+    """Draws error against cost, both logarithmic; lower left is better.
 
     The line of a model joins its Pareto front: the settings that no other of its settings beats in
     both error and cost. Only they are marked and labelled; all others are faint dots. Hollow marks
@@ -77,24 +104,64 @@ def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[
         return encode_png(figure)
 
 
+def plot_overview(
+    curves: Mapping[str, ArrayLike],
+    times: Sequence[float],
+    points: Sequence[WorkPoint],
+    gaps: Sequence[Gap],
+    captions: tuple[str, str],
+) -> bytes:
+    """Draws snapshots in the x-z plane beside the work-precision plot, 1600 by 700 pixels.
+
+    Args:
+        curves: label to snapshots (k, m, 3), the lowest first.
+        times: of the snapshots (s), (k,).
+        points: of the work-precision plot.
+        gaps: of the work-precision plot.
+        captions: a line above each side; what stands behind a newline is smaller.
+    """
+    check_some("curves", curves)
+    check_some("points", points)
+    with make_figure(OVERVIEW) as figure:
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.12))
+        for axes, caption in zip((left, right), captions, strict=True):
+            _write_caption(axes, caption)
+        stacks = {label: check_curve(label, curve)[:, :, [0, 2]] for label, curve in curves.items()}
+        handles = draw_shapes(left, stacks)
+        left.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.05, -0.13))
+        left.set_anchor("N")
+        drawing = draw_work_precision(right, points, gaps)
+        columns = -(-len(drawing.handles) // 2)
+        right.legend(
+            handles=drawing.handles, loc="upper left", bbox_to_anchor=(-0.08, -0.13), ncols=columns
+        )
+        label_snapshots(figure, left, stacks, times)
+        label_work_precision(figure, right, drawing, spacing=34.0)
+        return encode_png(figure)
+
+
+def _write_caption(axes: Axes, caption: str) -> None:
+    head, _, rest = caption.partition("\n")
+    axes.set_title(head, pad=22.0 if rest else 8.0)
+    write_note(axes, rest, (0.0, 1.0), xycoords="axes fraction", xytext=(0, 7), fontsize=8.5)
+
+
 @dataclass(frozen=True)
 class WorkDrawing:
-    """What was drawn, for its legend and its labels.
+    """The parts of a plot that its legend and its labels have to know.
 
     Attributes:
         handles: what the legend has to hold.
         fronts: of the series that are not raw.
         lines: x and y of what labels keep off.
-        gaps: with an arrow each.
-        texts: already written.
+        notes: already written, with their arrows.
         looks: by model.
     """
 
     handles: list[Line2D]
     fronts: list[list[WorkPoint]]
     lines: list[tuple[Array, Array]]
-    gaps: Sequence[Gap]
-    texts: list[Text]
+    notes: list[Annotation]
     looks: Mapping[str, Look]
 
 
@@ -113,16 +180,16 @@ def draw_work_precision(
     axes.set_ylabel("error")
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: format_seconds(value)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_percent(value)))
-    texts = draw_levels(axes, ERRORS)
+    notes: list[Annotation] = draw_levels(axes, ERRORS)
     _draw_real_time(axes)
-    texts += [draw_gap(axes, gap, looks[gap.against]) for gap in gaps]
+    notes += [note for gap in gaps for note in _draw_gap(axes, gap, looks[gap.against])]
     lines = [
         (np.array([p.wall_s_per_sim_s for p in front]), np.array([p.error for p in front]))
         for front in fronts.values()
     ]
     handles = _make_handles(looks, drawn, len(points) - len(drawn))
     shown = [front for (_, raw), front in fronts.items() if not raw]
-    return WorkDrawing(handles, shown, lines, gaps, texts, looks)
+    return WorkDrawing(handles, shown, lines, notes, looks)
 
 
 def label_work_precision(
@@ -130,12 +197,11 @@ def label_work_precision(
 ) -> None:
     """Labels front points `spacing` apart (points of length), once the rest is laid out."""
     figure.draw_without_rendering()
-    lines = drawing.lines + [trace_gap(axes, gap) for gap in drawing.gaps]
     wanted = _choose_labels(axes, drawing.fronts, drawing.looks, spacing)
-    label_points(figure, axes, wanted, lines, drawing.texts)
+    label_points(figure, axes, wanted, drawing.lines, drawing.notes)
 
 
-def find_pareto_front(cost: Array, error: Array) -> Array:
+def compute_pareto_front(cost: Array, error: Array) -> Array:
     """Returns the indices, by rising cost, of the points that no other beats in both."""
     best, front = np.inf, []
     for i in np.lexsort((error, cost)):
@@ -150,7 +216,7 @@ def _draw_series(axes: Axes, group: Sequence[WorkPoint], look: Look) -> list[Wor
     raw = group[0].is_raw
     cost = np.array([p.wall_s_per_sim_s for p in group])
     error = np.array([p.error for p in group])
-    front = find_pareto_front(cost, error)
+    front = compute_pareto_front(cost, error)
     beaten = np.setdiff1d(np.arange(len(group)), front)
     faint: dict[str, Any] = {"ls": "", "marker": look.marker, "ms": 2.6, "alpha": 0.28, "mew": 0.5}
     face = "none" if raw else look.color
@@ -173,22 +239,47 @@ def _draw_series(axes: Axes, group: Sequence[WorkPoint], look: Look) -> list[Wor
 
 
 def _draw_real_time(axes: Axes) -> None:
-    """A line where a simulated second takes a second."""
+    """Draws a line where a simulated second takes a second."""
     low, high = axes.get_xlim()
     if low < 1.0 < high:
         axes.axvline(1.0, color="#bbbbbb", lw=0.8, zorder=1)
-        axes.annotate(
-            "real time",
-            (1.0, 0.985),
-            xycoords=("data", "axes fraction"),
-            xytext=(-2, 0),
-            textcoords="offset points",
-            rotation=90,
-            ha="right",
-            va="top",
-            color=SOFT,
-            fontsize=7.5,
-        )
+        where: Any = {"xycoords": ("data", "axes fraction"), "xytext": (-2, 0), "rotation": 90}
+        write_note(axes, "real time", (1.0, 0.985), **where, ha="right", va="top")
+
+
+def _draw_gap(axes: Axes, gap: Gap, look: Look) -> tuple[Annotation, Annotation]:
+    """Draws an arrow along a level from one model's cost to the other's, with the ratio on it.
+
+    The cable's arrow stands above the level, anyone else's below.
+    """
+    side = 1.0 if gap.against == "cable" else -1.0
+    root = axes.get_figure(root=True)
+    assert root is not None
+    place = axes.transData + ScaledTranslation(0.0, side * _SHIFT / 72.0, root.dpi_scale_trans)
+    ends: Any = {"arrowstyle": "|-|,widthA=0.25,widthB=0.25", "shrinkA": 0.0, "shrinkB": 0.0}
+    arrow = axes.annotate(
+        "",
+        (gap.cost_against, gap.at_error),
+        (gap.cost, gap.at_error),
+        xycoords=place,
+        textcoords=place,
+        arrowprops={"color": look.ink, "lw": 0.9, **ends},
+        zorder=5,
+    )
+    ratio = gap.cost_against / gap.cost
+    style: Any = {"fontsize": 9.0, "fontweight": "bold", "path_effects": HALO, "zorder": 7}
+    number = write_note(
+        axes,
+        f"{ratio:.0f}\u00d7" if ratio >= 10.0 else f"{ratio:.1f}\u00d7",
+        (gap.cost * ratio ** (0.72 if side > 0.0 else 0.55), gap.at_error),
+        xycoords=place,
+        xytext=(0.0, side * 1.5),
+        ha="center",
+        va="bottom" if side > 0.0 else "top",
+        color=look.ink,
+        **style,
+    )
+    return arrow, number
 
 
 def _choose_labels(
@@ -223,13 +314,13 @@ def _choose_labels(
 
 
 def _find_reaching(front: Sequence[WorkPoint]) -> list[WorkPoint]:
-    """The cheapest point below each level."""
+    """Returns the cheapest point below each level."""
     reached = ([p for p in front if p.error <= level] for level in ERRORS)
     return [min(some, key=lambda p: p.wall_s_per_sim_s) for some in reached if some]
 
 
 def _locate(axes: Axes, point: WorkPoint) -> Array:
-    """Where a point lies, in pixels."""
+    """Returns where a point lies, in pixels."""
     return np.asarray(axes.transData.transform((point.wall_s_per_sim_s, point.error)))
 
 

@@ -19,12 +19,16 @@ An episode in a world has `sim_time`, and `turn` where agents move in turns; <na
 model's. docs/viewing.md lists its entities: /world (in space), /plots, /states, /log, /settings.
 """
 
+# ruff: noqa: E402 - without rerun, one line says what to install
+
+from hose_mj.extras import require
+
+require("rerun", "Rerun recordings and their viewer")
+
 from hose_mj.recording.rerun.comparison import write_recording
-from hose_mj.recording.rerun.grid import encode_grid_episode
-from hose_mj.recording.rerun.live import open_sinks
+from hose_mj.recording.rerun.episodes import encode_grid_episode, open_sinks, write_world_recording
 from hose_mj.recording.rerun.reading import read_outcomes, read_recording
-from hose_mj.recording.rerun.screenshot import open_recording, take_screenshot
-from hose_mj.recording.rerun.world_files import write_world_recording
+from hose_mj.recording.rerun.viewer import open_recording, take_screenshot
 
 __all__ = [
     "encode_grid_episode",

@@ -1,11 +1,15 @@
-"""What all recordings have in common: the application's name, the timeline, plain entities."""
+"""Pieces that all recordings share: stream, timeline, plain entities, texts, round spacings."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.palette import Rgb
+from hose_mj.recording.palette import Rgb
 
 APPLICATION_ID = "hose_mj"
 TIMELINE = "sim_time"
@@ -15,6 +19,30 @@ OUTCOME = "outcome"
 FACTS = ("ended_by", "break_kind", "break_time", "break_text")
 DARK = (17, 20, 24)
 """Ground colour of the spatial views."""
+HALF_VIEW = float(np.tan(np.radians(27.5)))
+"""The viewer's vertical field of view is 55 degrees."""
+_QUANTITIES = {
+    "m": "Distance",
+    "mm": "Distance",
+    "m/s": "Speed",
+    "N": "Force",
+    "N m": "Moment",
+    "J": "Energy",
+    "rad": "Angle",
+}
+
+
+def open_stream(
+    blueprint: rrb.BlueprintLike, recording_id: str | None = None
+) -> tuple[rr.RecordingStream, Callable[[], bytes]]:
+    """Opens a recording in memory; returns its stream and what gives the bytes of the whole .rrd.
+
+    Not `stream.save`: on a full disk that waits for its dead writer forever.
+    """
+    stream = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
+    sink = rr.binary_stream(stream)
+    stream.send_blueprint(blueprint, make_active=False, make_default=True)
+    return stream, lambda: bytes(sink.read(flush=True) or b"")
 
 
 def make_time(times: Array) -> rr.TimeColumn:
@@ -40,3 +68,26 @@ def log_scalars(
     style = rr.SeriesLines(colors=[color], widths=[width], names=[name])
     stream.log(path, style, static=True)
     stream.send_columns(path, [make_time(times)], rr.Scalars.columns(scalars=values))
+
+
+def name_quantity(unit: str) -> str:
+    """Returns the title of a plot of numbers in a unit: "Distance (mm)"."""
+    name = _QUANTITIES.get(unit, "Numbers")
+    return f"{name} ({unit})" if unit else name
+
+
+def format_table(settings: dict[str, str]) -> str:
+    """Returns the settings as a Markdown table."""
+    rows = [f"| {escape_cell(name)} | {escape_cell(value)} |" for name, value in settings.items()]
+    return "\n".join(["| setting | value |", "|---|---|", *rows])
+
+
+def round_spacing(length: float) -> float:
+    """Returns the largest of 1, 2, 5 times a power of ten that is not above a length."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * max(step for step in (1, 2, 5) if step <= length / power * (1 + 1e-9)))
+
+
+def escape_cell(text: object) -> str:
+    """Returns a text on one line, as it may stand in a Markdown table."""
+    return " ".join(str(text).split()).replace("|", "\\|")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from rerun.chunk import RrdReader
+import rerun as rr
 
-from hose_mj.errors import InputError
+from hose_mj.errors import HoseError, InputError
 from hose_mj.recording.rerun.parts import FACTS, OUTCOME
 
 
@@ -23,10 +23,12 @@ def read_recording(path: Path) -> dict[str, Any]:
         InputError: no such file, or nothing recorded in it.
     """
     try:
-        reader = RrdReader(path)
+        reader = _open_reader(path)
         store = reader.recordings()[0]
         chunks = list(reader.stream(store=store))
         n_blueprints = len(reader.blueprints())
+    except HoseError:
+        raise
     except Exception as error:  # rerun raises its own, undocumented kinds
         raise InputError("recording", str(path), "a readable .rrd file with a recording") from error
     entities: dict[str, dict[str, Any]] = {}
@@ -61,7 +63,7 @@ def read_outcomes(path: Path) -> dict[str, dict[str, Any]]:
         InputError: no such file, or nothing recorded in it.
     """
     read_recording(path)
-    reader = RrdReader(path)
+    reader = _open_reader(path)
     prefix = f"/__properties/{OUTCOME}"
     found: dict[str, dict[str, Any]] = {}
     for chunk in reader.stream(store=reader.recordings()[0]):
@@ -71,3 +73,14 @@ def read_outcomes(path: Path) -> dict[str, dict[str, Any]]:
             name = entity[len(prefix) :].replace("\\", "").strip()
             found[name] = {key: row[key][0] for key in FACTS if row.get(key)}
     return found
+
+
+def _open_reader(path: Path) -> Any:
+    try:
+        from rerun.chunk import RrdReader  # may move or change with any minor version
+    except ImportError:
+        raise HoseError(
+            f"rerun {rr.__version__} has no rerun.chunk.RrdReader, which reads recordings; "
+            "rerun-sdk 0.41 has it"
+        ) from None
+    return RrdReader(path)

@@ -8,29 +8,21 @@ import numpy as np
 import rerun as rr
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.plots.palette import OTHERS, Rgb, lighten
+from hose_mj.recording.palette import OTHERS, Rgb, color_tension, lighten
 from hose_mj.recording.rerun.parts import OUTCOME, TIMELINE, TURNS, make_time
-from hose_mj.recording.rerun.world_stage import (
+from hose_mj.recording.rerun.world_scene import (
     Look,
     drawn_radius,
     log_robots,
     path_of,
     scale_forces,
 )
-from hose_mj.recording.stage import Margin, Stage
-from hose_mj.recording.tension import color_tension
-from hose_mj.recording.world_episode import BreakMark, Outcome, Samples
+from hose_mj.recording.scene_description import Margin, SceneDescription
+from hose_mj.recording.world_episode import BreakMark, EpisodeEnding, Samples
 
 BREAK_COLOR: Rgb = (255, 40, 50)
 FORCE_COLOR: Rgb = (190, 120, 255)
 CONTROL_COLOR: Rgb = (120, 230, 255)
-KIND_COLORS: dict[str, Rgb] = {
-    "stretch": (244, 130, 30),
-    "run-over": (180, 120, 255),
-    "collision": (230, 90, 160),
-    "bounds": (120, 170, 255),
-    "obstacle": (90, 200, 140),
-}
 LIVELY: tuple[Rgb, ...] = ((240, 150, 50), (80, 160, 240), (90, 200, 140), (220, 110, 190))
 """Colours of the robots' turns."""
 
@@ -40,12 +32,12 @@ class WorldLog:
 
     Args:
         stream: where to.
-        stage: what is on stage.
+        scene: what stands still in it.
         look: how it is told apart from others in the same recording.
     """
 
-    def __init__(self, stream: rr.RecordingStream, stage: Stage, look: Look) -> None:
-        self._stream, self._stage, self._look = stream, stage, look
+    def __init__(self, stream: rr.RecordingStream, scene: SceneDescription, look: Look) -> None:
+        self._stream, self._scene, self._look = stream, scene, look
         self._owner = self._vetoed = ""
         self._log_styles()
 
@@ -63,55 +55,56 @@ class WorldLog:
         self._add_states(samples)
         self._add_events(samples)
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, ending: EpisodeEnding) -> None:
         """Logs how it ended; a recording says so in its properties, see `read_outcome`."""
-        mark = outcome.mark
-        facts: dict[str, Any] = {"ended_by": outcome.ended_by}
+        mark = ending.mark
+        facts: dict[str, Any] = {"ended_by": ending.ended_by}
         if mark is not None:
             self._mark_break(mark)
             facts |= {"break_kind": mark.kind, "break_time": mark.time, "break_text": mark.text}
-        self._stream.send_property(f"{OUTCOME} {self._stage.name}", rr.AnyValues(**facts))
+        self._stream.send_property(f"{OUTCOME} {self._scene.name}", rr.AnyValues(**facts))
 
     @property
     def _name(self) -> str:
-        return str(rr.escape_entity_path_part(self._stage.name))
+        return str(rr.escape_entity_path_part(self._scene.name))
 
     def _log_styles(self) -> None:
         """Logs what stays the same of entities that change."""
-        stage, stream = self._stage, self._stream
-        log_robots(stream, stage, self._look)
-        style: dict[str, Any] = {"radii": [drawn_radius(stage)]}
+        scene, stream = self._scene, self._stream
+        log_robots(stream, scene, self._look)
+        style: dict[str, Any] = {"radii": [drawn_radius(scene)]}
         if self._look.rank:
             style["colors"] = [(*self._look.color, 150)]
-        hose = path_of(stage, "hose")
+        hose = path_of(scene, "hose")
         stream.log(hose, rr.LineStrips3D.from_fields(**style), static=True)
-        points = rr.Points3D.from_fields(radii=[1.5 * drawn_radius(stage)], colors=[CONTROL_COLOR])
-        if stage.n_control_points:
-            stream.log(path_of(stage, "control_points"), points, static=True)
+        points = rr.Points3D.from_fields(radii=[1.5 * drawn_radius(scene)], colors=[CONTROL_COLOR])
+        if scene.n_control_points:
+            stream.log(path_of(scene, "control_points"), points, static=True)
         arrows = rr.Arrows3D.from_fields(
             colors=[FORCE_COLOR] if not self._look.rank else [(*self._look.color, 150)],
-            radii=[0.003 * stage.size],
+            radii=[0.003 * scene.size],
         )
-        stream.log(path_of(stage, "forces"), arrows, static=True)
+        stream.log(path_of(scene, "forces"), arrows, static=True)
         names = rr.Points3D.from_fields(
-            radii=[0.0], labels=list(stage.robots), show_labels=True, colors=[(235, 238, 242)]
+            radii=[0.0], labels=list(scene.robots), show_labels=True, colors=[(235, 238, 242)]
         )
         if not self._look.rank:
-            stream.log(path_of(stage, "names"), names, static=True)
+            stream.log(path_of(scene, "names"), names, static=True)
         self._log_line_styles()
 
     def _log_line_styles(self) -> None:
-        stage, stream = self._stage, self._stream
-        for unit, kind in list_kinds(stage):
-            lines = [margin for margin in stage.margins if margin.kind == kind]
+        scene, stream = self._scene, self._stream
+        styles = {kind.name: kind.color for kind in scene.kinds}
+        for place, (unit, kind) in enumerate(list_kinds(scene)):
+            lines = [margin for margin in scene.margins if margin.kind == kind]
             share = np.linspace(0.0, 0.55, len(lines))
-            base = self._look.tint((*KIND_COLORS.get(kind, OTHERS[0]), 255))[:3]
+            base = self._look.tint((*styles.get(kind, OTHERS[place % len(OTHERS)]), 255))[:3]
             colors = [lighten(base, float(part)) for part in share]
             names = [self._label(margin.name) for margin in lines]
             widths = [1.5] * len(lines)
             style = rr.SeriesLines(colors=colors, names=names, widths=widths)
             stream.log(self._margin_path(unit, kind), style, static=True)
-        for unit in dict.fromkeys(margin.unit for margin in stage.margins):
+        for unit in dict.fromkeys(margin.unit for margin in scene.margins):
             style = rr.SeriesLines(colors=[BREAK_COLOR], names=["limit"], widths=[2.5])
             stream.log(self._margin_path(unit, "limit"), style, static=True)
         reward = rr.SeriesLines(
@@ -121,25 +114,25 @@ class WorldLog:
         )
         stream.log(f"plots/{self._name}/reward", reward, static=True)
         owners = rr.StateConfiguration(
-            values=list(stage.robots), colors=[LIVELY[i % 4] for i in range(len(stage.robots))]
+            values=list(scene.robots), colors=[LIVELY[i % 4] for i in range(len(scene.robots))]
         )
         stream.log(f"states/{self._name}/turn", owners, static=True)
 
     def _label(self, name: str) -> str:
-        return f"{self._stage.name}: {name}" if self._look.rank else name
+        return f"{self._scene.name}: {name}" if self._look.rank else name
 
     def _margin_path(self, unit: str, kind: str) -> str:
         return f"plots/{self._name}/{unit}/{rr.escape_entity_path_part(kind)}"
 
     def _add_robots(self, samples: Samples, index: list[rr.TimeColumn]) -> None:
-        for i, body in enumerate(self._stage.bodies):
+        for i, body in enumerate(self._scene.bodies):
             columns = rr.Transform3D.columns(
                 translation=samples.rows["positions"][:, i],
                 quaternion=np.roll(samples.rows["quaternions"][:, i], -1, axis=1),
             )
-            self._stream.send_columns(path_of(self._stage, "robots", body), index, columns)
+            self._stream.send_columns(path_of(self._scene, "robots", body), index, columns)
         if not self._look.rank:
-            lift = np.array([0.0, 0.0, 0.06 * self._stage.size])
+            lift = np.array([0.0, 0.0, 0.06 * self._scene.size])
             places = samples.rows["attachments"][:, :-1] + lift.astype(np.float32)
             self._send_points("names", places, index)
 
@@ -150,38 +143,38 @@ class WorldLog:
         styles: dict[str, Any] = {}
         if not self._look.rank:
             middle = 0.5 * (tension[:, :-1] + tension[:, 1:])
-            colors = color_tension(middle, self._stage.tension_limit).reshape(-1, 3)
+            colors = color_tension(middle, self._scene.tension_limit).reshape(-1, 3)
             styles["colors"] = pack_colors(colors)
         columns = rr.LineStrips3D.columns(strips=pieces, **styles).partition([n] * k)
-        self._stream.send_columns(path_of(self._stage, "hose"), index, columns)
-        if self._stage.n_control_points:
+        self._stream.send_columns(path_of(self._scene, "hose"), index, columns)
+        if self._scene.n_control_points:
             self._send_points("control_points", samples.rows["control_points"], index)
 
     def _add_forces(self, samples: Samples, index: list[rr.TimeColumn]) -> None:
         places, forces = samples.rows["attachments"], samples.rows["forces"]
         k, n = places.shape[:2]
         columns = rr.Arrows3D.columns(
-            vectors=scale_forces(self._stage, forces).reshape(-1, 3),
+            vectors=scale_forces(self._scene, forces).reshape(-1, 3),
             origins=places.reshape(-1, 3),
         )
-        path = path_of(self._stage, "forces")
+        path = path_of(self._scene, "forces")
         self._stream.send_columns(path, index, columns.partition([n] * k))
 
     def _add_margins(self, samples: Samples, index: list[rr.TimeColumn]) -> None:
-        stage, margins = self._stage, samples.rows["margins"]
+        scene, margins = self._scene, samples.rows["margins"]
         k = len(samples)
-        for unit, kind in list_kinds(stage):
-            chosen = [i for i, margin in enumerate(stage.margins) if margin.kind == kind]
+        for unit, kind in list_kinds(scene):
+            chosen = [i for i, margin in enumerate(scene.margins) if margin.kind == kind]
             columns = rr.Scalars.columns(scalars=margins[:, chosen].ravel())
             columns = columns.partition([len(chosen)] * k)
             self._stream.send_columns(self._margin_path(unit, kind), index, columns)
         ends = [make_time(samples.times[[0, -1]] if k > 1 else samples.times)]
-        for unit in dict.fromkeys(margin.unit for margin in stage.margins):
+        for unit in dict.fromkeys(margin.unit for margin in scene.margins):
             zeros = rr.Scalars.columns(scalars=np.zeros(min(k, 2)))
             self._stream.send_columns(self._margin_path(unit, "limit"), ends, zeros)
 
     def _add_states(self, samples: Samples) -> None:
-        """Only changes are logged: a state lasts until the next."""
+        """Logs changes only: a state lasts until the next."""
         for kind, texts, last in (
             ("turn", samples.owners, self._owner),
             ("vetoed", samples.vetoed, self._vetoed),
@@ -206,20 +199,20 @@ class WorldLog:
     def _send_points(self, name: str, points: Array, index: list[rr.TimeColumn]) -> None:
         k, n = points.shape[:2]
         columns = rr.Points3D.columns(positions=points.reshape(-1, 3)).partition([n] * k)
-        self._stream.send_columns(path_of(self._stage, name), index, columns)
+        self._stream.send_columns(path_of(self._scene, name), index, columns)
 
     def _mark_break(self, mark: BreakMark) -> None:
-        """A red ball in space, a red state, and an error in the log, from its time on."""
-        stream, stage = self._stream, self._stage
+        """Logs a red ball in space, a red state, and an error in the log, from its time on."""
+        stream, scene = self._stream, self._scene
         stream.set_log_time_enabled(False)
         stream.set_time(TIMELINE, duration=mark.time)
-        top = mark.place + np.array([0.0, 0.0, (0.16 + 0.06 * self._look.rank) * stage.size])
-        ball = rr.Points3D([mark.place], colors=[BREAK_COLOR], radii=[0.014 * stage.size])
-        stream.log(path_of(stage, "break"), ball)
+        top = mark.place + np.array([0.0, 0.0, (0.16 + 0.06 * self._look.rank) * scene.size])
+        ball = rr.Points3D([mark.place], colors=[BREAK_COLOR], radii=[0.014 * scene.size])
+        stream.log(path_of(scene, "break"), ball)
         pin = rr.LineStrips3D(
-            [[mark.place, top]], colors=[BREAK_COLOR], radii=[0.0035 * stage.size]
+            [[mark.place, top]], colors=[BREAK_COLOR], radii=[0.0035 * scene.size]
         )
-        stream.log(path_of(stage, "break", "pin"), pin)
+        stream.log(path_of(scene, "break", "pin"), pin)
         label = rr.Points3D(
             [top],
             labels=[f"{self._label(mark.kind)}, {mark.time:.2f} s"],
@@ -227,7 +220,7 @@ class WorldLog:
             colors=[BREAK_COLOR],
             show_labels=True,
         )
-        stream.log(path_of(stage, "break", "label"), label)
+        stream.log(path_of(scene, "break", "label"), label)
         state = rr.StateConfiguration(values=[mark.kind], colors=[BREAK_COLOR])
         stream.log(f"states/{self._name}/break", state, static=True)
         stream.log(f"states/{self._name}/break", rr.StateChange(state=mark.kind))
@@ -235,9 +228,9 @@ class WorldLog:
         stream.reset_time()
 
 
-def list_kinds(stage: Stage) -> list[tuple[str, str]]:
-    """Lists unit and kind of the stage's margins, each pair once."""
-    margins: tuple[Margin, ...] = stage.margins
+def list_kinds(scene: SceneDescription) -> list[tuple[str, str]]:
+    """Lists unit and kind of the scene's margins, each pair once."""
+    margins: tuple[Margin, ...] = scene.margins
     return list(dict.fromkeys((margin.unit, margin.kind) for margin in margins))
 
 

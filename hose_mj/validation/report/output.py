@@ -10,9 +10,9 @@ import numpy as np
 from hose_mj.recording.document import format_document
 from hose_mj.recording.episode import HoseTrack, Scene, Series
 from hose_mj.recording.files import write_atomically
+from hose_mj.recording.palette import COLORS
 from hose_mj.recording.parquet import write_records
 from hose_mj.recording.plots.api import choose_length_unit
-from hose_mj.recording.plots.palette import COLORS
 from hose_mj.recording.rerun import write_recording
 from hose_mj.validation.compare import CaseResult
 from hose_mj.validation.report.page import make_report

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hose_mj.recording.page import Page, Picture, Section
-from hose_mj.recording.plots.palette import name_model
+from hose_mj.recording.palette import name_model
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.report.own_page import write_own
 from hose_mj.validation.report.pictures import (

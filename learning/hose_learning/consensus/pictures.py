@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
+from hose_mj.recording.palette import OTHERS, darken, format_hex
 from hose_mj.recording.plots.labels import label_line_ends
-from hose_mj.recording.plots.palette import OTHERS, darken, format_hex
 from hose_mj.recording.plots.style import SOFT, encode_png, make_figure
 
 if TYPE_CHECKING:

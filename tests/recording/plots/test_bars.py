@@ -9,8 +9,8 @@ import matplotlib.image
 import pytest
 
 from hose_mj.errors import InputError
+from hose_mj.recording.palette import OTHERS
 from hose_mj.recording.plots.bars import Bar, BarPanel, plot_bars
-from hose_mj.recording.plots.palette import OTHERS
 
 
 def count_pixels(png, color):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.recording.plots.learning import PANEL, Curve, Panel, plot_learning
+from hose_mj.recording.plots.curves import PANEL, Curve, Panel, plot_learning
 from hose_mj.recording.plots.style import DPI
 
 X = np.arange(1.0, 11.0)

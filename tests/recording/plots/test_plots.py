@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
+from hose_mj.recording.palette import COLORS, find_model, lighten, name_model
 from hose_mj.recording.plots import api as plots
-from hose_mj.recording.plots.axes import format_percent, format_seconds
 from hose_mj.recording.plots.labels import Label, label_points, spread_apart
-from hose_mj.recording.plots.palette import COLORS, find_model, lighten, name_model
 from hose_mj.recording.plots.shapes import choose_label_point, choose_size, group_places
 from hose_mj.recording.plots.statics import shade
-from hose_mj.recording.plots.style import make_axes
+from hose_mj.recording.plots.style import format_percent, format_seconds, make_axes
 
 TIMES = np.linspace(0.0, 1.0, 20)
 MODELS = ("geds", "cable", "flex", "hinge-chain")
@@ -153,7 +152,7 @@ def test_quantities_have_units_that_suit_them():
 
 def test_the_pareto_front_has_no_beaten_point():
     cost, error = np.array([1.0, 2.0, 2.0, 3.0, 4.0]), np.array([5.0, 4.0, 6.0, 4.5, 1.0])
-    assert plots.find_pareto_front(cost, error).tolist() == [0, 1, 4]
+    assert plots.compute_pareto_front(cost, error).tolist() == [0, 1, 4]
 
 
 def test_the_order_of_an_exact_power_law_is_measured():

@@ -1,4 +1,4 @@
-"""The stage of an episode in a world: everything that is to be seen and does not change.
+"""Describes the scene of an episode in a world: all that is to be seen and does not change.
 
 Plain data in the world frame, SI units. Quaternions are w, x, y, z.
 """
@@ -6,6 +6,7 @@ Plain data in the world frame, SI units. Quaternions are w, x, y, z.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from hose_mj.recording.episode import (
     check_unique,
     lock_array,
 )
+from hose_mj.recording.palette import Rgb
 
 GEOM_KINDS = ("plane", "box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh")
 WORLD = -1
@@ -30,12 +32,12 @@ class Geom:
     """One shape, in the frame of a body.
 
     Attributes:
-        name: unique on its stage.
+        name: unique in its scene.
         kind: one of `GEOM_KINDS`.
         size: as MuJoCo has it, (3,), m: box, plane and ellipsoid half sizes; sphere radius;
             capsule and cylinder radius and half length (along z); mesh none.
         color: red, green, blue, opacity, 0 to 255.
-        body: index into the stage's bodies, or `WORLD`.
+        body: index into the scene's bodies, or `WORLD`.
         position: (3,), m.
         quaternion: (4,).
         vertices: of a mesh, (v, 3), m; None for other kinds.
@@ -79,7 +81,7 @@ class Margin:
     """A distance to a limit, which is at 0; positive is fine.
 
     Attributes:
-        name: for the reader ("stretch 0"); unique on its stage.
+        name: for the reader ("stretch 0"); unique in its scene.
         kind: which constraint it watches.
         unit: "N" or "m".
         limit: what 0 means, in words ("at most 120 N"); may be empty.
@@ -95,9 +97,35 @@ class Margin:
         check_name(f"kind of margin {self.name!r}", self.kind)
 
 
+class KindStyle(NamedTuple):
+    """The look of a kind of constraint in plots; a kind without a style takes a spare colour.
+
+    Attributes:
+        name: of the kind, as `Margin.kind` has it.
+        unit: of its margins, "N" or "m".
+        color: of its lines.
+        sentence: what the constraint asks for, for the reader; may be empty.
+    """
+
+    name: str
+    unit: str
+    color: Rgb
+    sentence: str = ""
+
+
+KINDS = (
+    KindStyle("stretch", "N", (244, 130, 30)),
+    KindStyle("run-over", "m", (180, 120, 255)),
+    KindStyle("collision", "m", (230, 90, 160)),
+    KindStyle("bounds", "m", (120, 170, 255)),
+    KindStyle("obstacle", "m", (90, 200, 140)),
+)
+"""The styles of a scene that brings none of its own."""
+
+
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """What is on stage.
+class SceneDescription:
+    """Everything of an episode in a world that is seen and stays as it is.
 
     Attributes:
         name: of the hose model, or whatever tells two episodes apart; unique where two are shown.
@@ -116,6 +144,7 @@ class Stage:
         settings: shown beside it, in this order.
         source: where the hose begins, (3,), m.
         cell: width of the squares drawn on the ground around the source, m; 0 for none.
+        kinds: how the kinds of the margins are shown.
     """
 
     name: str
@@ -135,10 +164,11 @@ class Stage:
     source: Array
     settings: dict[str, str] = field(default_factory=dict)
     cell: float = 0.0
+    kinds: tuple[KindStyle, ...] = KINDS
 
     def __post_init__(self) -> None:
-        check_name("name of a stage", self.name)
-        what = f"stage {self.name!r}"
+        check_name("name of a scene", self.name)
+        what = f"scene {self.name!r}"
         check_unique(f"geoms of {what}", [geom.name for geom in self.geoms])
         check_unique(f"bodies of {what}", list(self.bodies))
         check_unique(f"margins of {what}", [margin.name for margin in self.margins])
@@ -163,17 +193,17 @@ class Stage:
 
     @property
     def size(self) -> float:
-        """Largest extent of the space worth looking at (m)."""
+        """Returns the largest extent of the space worth looking at (m)."""
         return float(np.max(self.high - self.low))
 
     @property
     def ground(self) -> float:
-        """Height of the highest plane, or of the lowest thing where there is none (m)."""
+        """Returns the height of the highest plane, or of the lowest thing without one (m)."""
         planes = [geom.position[2] for geom in self.geoms if geom.kind == "plane"]
         return float(max(planes, default=self.low[2]))
 
     @property
     def is_planar(self) -> bool:
-        """Whether it is much wider than high."""
+        """Says whether it is much wider than high."""
         extent = self.high - self.low
         return bool(extent[2] < 0.4 * max(extent[:2]))

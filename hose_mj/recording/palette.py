@@ -1,10 +1,14 @@
-"""One colour per hose model, the same in plots, reports and the viewer.
+"""One colour per hose model, the same in plots, reports and the viewer; colours of the tension.
 
-The colours are Okabe and Ito's, told apart by readers with any common colour blindness, and have
-enough contrast on white paper as well as on the viewer's dark ground.
+The models' colours are Okabe and Ito's: readers with any common colour blindness tell them apart,
+on white paper as well as on the viewer's dark ground. A model that is not listed, such as one of a
+plug-in, has a spare colour.
 """
 
 from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
 
 Rgb = tuple[int, int, int]
 """Red, green, blue, each 0 to 255."""
@@ -34,6 +38,16 @@ NAMES: dict[str, str] = {
 }
 LIMIT: Rgb = (160, 40, 40)
 OTHERS: tuple[Rgb, ...] = ((230, 159, 0), (0, 114, 178), (120, 94, 200), (100, 100, 60))
+
+
+LOWEST_TENSION = -0.25
+"""Lowest tension that has a colour of its own, as a fraction of the limit."""
+_FRACTIONS = np.array([LOWEST_TENSION, 0.0, 0.35, 0.7, 1.0])
+_TENSION_COLORS = np.array(
+    [[60, 120, 230], [214, 222, 230], [248, 214, 70], [244, 130, 30], [214, 30, 40]],
+    dtype=np.float64,
+)
+"""Blue for pushed, pale for slack, yellow to red for pulled."""
 
 
 def find_model(label: str) -> str | None:
@@ -78,3 +92,18 @@ def lighten(color: Rgb, share: float) -> Rgb:
 def format_hex(color: Rgb) -> str:
     """Returns "#rrggbb"."""
     return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+def color_tension(tension: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
+    """Returns red, green, blue of tensions (...), N, shape (..., 3); `limit` (N) is red."""
+    fractions = np.asarray(tension, dtype=np.float64) / limit
+    parts = [np.interp(fractions, _FRACTIONS, _TENSION_COLORS[:, k]) for k in range(3)]
+    return np.stack(parts, axis=-1).round().astype(np.uint8)
+
+
+def make_tension_scale(
+    limit: float, width: int = 400
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Returns the colours from lowest to limit, (width, 3), and round tensions to label, N."""
+    colors = color_tension(np.linspace(LOWEST_TENSION * limit, limit, width), limit)
+    return colors, limit * np.array([LOWEST_TENSION, 0.0, 0.25, 0.5, 0.75, 1.0])

@@ -1,4 +1,4 @@
-"""Starts Rerun's viewer without a window, on this machine only, and always ends it."""
+"""Rerun's viewer, on this machine only: in a window, or without one for pictures, always ended."""
 
 from __future__ import annotations
 
@@ -13,11 +13,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import rerun as rr
 
 from hose_mj.errors import HoseError
+from hose_mj.recording.files import write_atomically
+from hose_mj.recording.rerun.parts import TIMELINE
+from hose_mj.recording.rerun.reading import read_recording
 
 DEBIAN_PACKAGES = ("mesa-vulkan-drivers", "libvulkan1")
 _HOST = "127.0.0.1"
+_STILL = 3  # pictures in a row that must agree before the viewer counts as done drawing
+_START_S = 30.0
+"""How long a viewer may take to start (s)."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +39,7 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where a client connects to."""
+        """Returns where a client connects to."""
         return f"rerun+http://{_HOST}:{self.port}/proxy"
 
     def check_alive(self, grace_s: float = 0.0) -> None:
@@ -101,7 +110,7 @@ def open_window(*files: Path) -> str:
 
 
 def has_display() -> bool:
-    """Whether a window can be opened; taken for granted where X11 and Wayland are not usual."""
+    """Says whether a window can be opened; it can where X11 and Wayland are not usual."""
     named = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
     return bool(named) or not sys.platform.startswith("linux")
 
@@ -147,3 +156,99 @@ def explain_failure(messages: str) -> str:
     lines = [line.strip() for line in messages.splitlines() if line.strip()]
     last = [line for line in lines if "panicked" in line] or lines[-3:]
     return f"the viewer ended by itself: {' | '.join(last) or 'it printed nothing'}"
+
+
+def connect(url: str) -> Any:
+    """Returns a client that asks and steers the viewer at a URL.
+
+    Raises:
+        HoseError: this version of rerun has no such client where we know it.
+    """
+    try:
+        from rerun.experimental import ViewerClient  # may move or change with any minor version
+    except ImportError:
+        raise HoseError(
+            f"rerun {rr.__version__} has no rerun.experimental.ViewerClient, which steers the "
+            "viewer and takes its picture; rerun-sdk 0.41 has it"
+        ) from None
+    return ViewerClient.connect(url)
+
+
+def take_screenshot(
+    path_rrd: Path,
+    path_png: Path,
+    timeout_s: float = 60.0,
+    size: tuple[int, int] = (1600, 1000),
+    at_s: float | None = None,
+) -> None:
+    """Writes what the viewer shows of a recording, drawn without a screen.
+
+    Args:
+        path_rrd: the recording.
+        path_png: the picture, replaced atomically.
+        timeout_s: longest wait, viewer's start included; one answer of its may add 15 s.
+        size: width and height in pixels.
+        at_s: simulated time to show, the last sample by default.
+
+    Raises:
+        InputError: not a recording.
+        HoseError: the viewer cannot run here (the message says what to install) or took too long.
+    """
+    read_recording(path_rrd)
+    deadline = time.monotonic() + timeout_s
+    with start_viewer(size) as viewer:
+        viewer.wait_until_listening(deadline)
+        try:
+            picture = _photograph(viewer, Path(path_rrd).resolve(), at_s, deadline)
+        except HoseError:
+            raise
+        except Exception as error:  # the viewer's client raises plain kinds
+            viewer.check_alive(grace_s=3.0)
+            raise HoseError(f"the viewer gave no picture of {path_rrd}: {error}") from error
+    write_atomically(Path(path_png), picture)
+
+
+def _photograph(viewer: Viewer, recording: Path, at_s: float | None, deadline: float) -> bytes:
+    """Opens a recording, moves the time cursor and waits until the picture no longer changes."""
+    client = connect(viewer.url)
+    client.open(str(recording))
+    lines = client.get_state().recordings[0].timelines
+    if at_s is None:
+        at_s = max((1e-9 * (line.end or 0) for line in lines if line.name == TIMELINE), default=0.0)
+    if any(line.name == TIMELINE for line in lines):  # an episode on a grid has turns instead
+        client.set_time(TIMELINE, duration=at_s, play_state="paused")
+    pictures: list[bytes] = []
+    while len(pictures) < _STILL or len(set(pictures[-_STILL:])) > 1:
+        if time.monotonic() > deadline:
+            raise HoseError(f"the viewer was still drawing {recording} when the time was up")
+        time.sleep(0.4)
+        pictures.append(client.take_screenshot())
+    return pictures[-1]
+
+
+def open_recording(path_rrd: Path, at_s: float | None) -> None:
+    """Opens a recording in a window of the viewer, which stays when this process ends.
+
+    Args:
+        path_rrd: the recording.
+        at_s: simulated time to stop at; None to leave the time alone.
+
+    Raises:
+        HoseError: there is no display, or the viewer did not start in time.
+    """
+    url = open_window(Path(path_rrd).resolve())
+    if at_s is None:
+        return
+    deadline = time.monotonic() + _START_S
+    while True:
+        try:
+            client = connect(url)
+            if client.get_state().recordings:
+                client.set_time(TIMELINE, duration=at_s, play_state="paused")
+                return
+        except Exception as error:  # the viewer's client raises plain kinds
+            if time.monotonic() > deadline:
+                raise HoseError(f"the viewer did not start: {error}") from error
+        if time.monotonic() > deadline:
+            raise HoseError(f"the viewer did not open {path_rrd} in time")
+        time.sleep(0.3)

@@ -14,10 +14,12 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 # What each part stands on; the longest prefix of a module's name decides its part.
-_BASE = {"hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets", "hose_mj.plugins"}
-_SCENES = _BASE | {"hose_mj.hoses.spec"}
-_HOSES = _BASE | {"hose_mj.hoses.spec"}
-_WORLD = _SCENES | {"hose_mj.hoses", "hose_mj.scenes"}
+_BASE = {
+    *("hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets", "hose_mj.plugins"),
+    "hose_mj.toml_table",
+}
+_SPEC = _BASE | {"hose_mj.hoses.spec", "hose_mj.hoses.materials"}
+_WORLD = _SPEC | {"hose_mj.hoses", "hose_mj.scenes"}
 _CONSTRAINTS = _WORLD | {"hose_mj.world"}
 FLOORS = {
     "hose_mj": {"hose_mj.errors", "hose_mj.hoses.registry", "hose_mj.hoses.spec"},
@@ -27,9 +29,11 @@ FLOORS = {
     "hose_mj.jit": set(),
     "hose_mj.plugins": {"hose_mj.errors"},
     "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks"},
-    "hose_mj.hoses.spec": {"hose_mj.errors"},
-    "hose_mj.hoses": _HOSES,
-    "hose_mj.scenes": _SCENES,
+    "hose_mj.toml_table": {"hose_mj.errors"},
+    "hose_mj.hoses.materials": {"hose_mj.errors", "hose_mj.assets", "hose_mj.toml_table"},
+    "hose_mj.hoses.spec": {"hose_mj.errors", "hose_mj.hoses.materials"},
+    "hose_mj.hoses": _SPEC,
+    "hose_mj.scenes": _SPEC,
     "hose_mj.validation": _WORLD | {"hose_mj.recording"},
     "hose_mj.world": _WORLD,
     "hose_mj.constraints": _CONSTRAINTS,

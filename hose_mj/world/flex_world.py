@@ -73,7 +73,7 @@ class FlexWorld(MujocoWorld):
         changes = np.flatnonzero(np.diff(contact.bits)) + 1
         for k, run in enumerate(np.split(np.arange(len(contact.bits)), changes)):
             vertices = range(int(run[0]), int(run[-1]) + 2)
-            touching = add_edges(maker, f"contact{k}", vertices, spec.radius)
+            touching = add_edges(maker, f"contact{k}", vertices, spec.outer_radius)
             contact.write(touching, int(contact.bits[run[0]]) | contact.plane_bit)
         for k, vertex in enumerate(self._held):
             maker.body(f"v{vertex}").add_site(name=f"hold{k}")

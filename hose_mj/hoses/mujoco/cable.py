@@ -125,7 +125,7 @@ class BallJoints(ChainKind):
         self, layout: ChainLayout, root: tuple[Array, Array] | None
     ) -> tuple[mujoco.MjSpec, list[Any]]:
         """The composite, with its nodes (single precision in MuJoCo's compiler) set exactly."""
-        h, second_moment = layout.segment_length, math.pi * self.spec.radius**4 / 4
+        h, second_moment = layout.segment_length, math.pi * self.spec.outer_radius**4 / 4
         xml = _XML.format(
             nodes=layout.segments + 1,
             size=h * layout.segments,
@@ -133,7 +133,7 @@ class BallJoints(ChainKind):
             twist=self.stiffness[0] / (2 * second_moment),
             bend=self.stiffness[1] / second_moment,
             damping=self.spec.damping_time * self.stiffness[1] / h,
-            radius=self.spec.radius,
+            radius=self.spec.outer_radius,
         )
         maker = mujoco.MjSpec.from_string(xml)
         bodies = [body for body in maker.bodies if body.name.startswith("B_")]

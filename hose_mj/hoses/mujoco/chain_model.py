@@ -61,7 +61,7 @@ class ChainModel(MujocoModel):
         self.kind = kind
         correct = settings.clamp_correction
         self.layout = make_layout(spec.length, settings.segments, held, clamp_correction=correct)
-        self.mass = ChainMass.of_hose(self.layout, spec.linear_density, spec.radius)
+        self.mass = ChainMass.of_hose(self.layout, spec.linear_density, spec.outer_radius)
         self.rooted = any(item.rigid for item in held)
         root = next((self._root_pose(item) for item in held if item.rigid), None)
         maker, bodies = kind.make_chain(self.layout, root)

@@ -129,7 +129,7 @@ class HingeJoints(ChainKind):
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_CAPSULE,
                 fromto=[0, 0, 0, h, 0, 0],
-                size=[self.spec.radius, 0, 0],
+                size=[self.spec.outer_radius, 0, 0],
                 contype=0,
                 conaffinity=0,
             )

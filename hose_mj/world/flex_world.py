@@ -7,8 +7,7 @@ import numpy as np
 
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.mujoco.chain_holds import find_rows
-from hose_mj.hoses.mujoco.flex_layout import FlexLayout
-from hose_mj.hoses.mujoco.flex_motion import FlexMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion
 from hose_mj.hoses.mujoco.flex_rod import add_edges, make_rod
 from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.hoses.spec import HoseSpec

@@ -11,10 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_kind import ChainKind
-from hose_mj.hoses.mujoco.chain_layout import ChainLayout, conjugate, multiply, rotation_matrix
-from hose_mj.hoses.mujoco.chain_obstacles import check_obstacles
-from hose_mj.hoses.mujoco.chain_settings import ChainSettings
+from hose_mj.hoses.mujoco.chain_layout import (
+    ChainKind,
+    ChainLayout,
+    conjugate,
+    multiply,
+    rotation_matrix,
+)
+from hose_mj.hoses.mujoco.chain_settings import ChainSettings, check_obstacles
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_choice
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_kind import ChainKind
 from hose_mj.hoses.mujoco.chain_layout import (
+    ChainKind,
     ChainLayout,
     conjugate,
     multiply,

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.mujoco.flex_layout import FlexLayout, interpolate
-from hose_mj.hoses.mujoco.flex_motion import FlexMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion, interpolate
 from hose_mj.hoses.protocol import Hold
 from hose_mj.hoses.registry import make_hose
 from hose_mj.hoses.spec import Fitting, HoseSpec

@@ -11,6 +11,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses import registry
 from hose_mj.hoses.registry import MODELS, find_model, list_models, make_hose
 from hose_mj.hoses.spec import HoseSpec
+from hose_mj.world.registry import make_world
 
 SPEC = HoseSpec(length=1.0, axial_stiffness=2e4, bending_stiffness=0.05, linear_density=0.1)
 SOURCE = """
@@ -88,6 +89,8 @@ def test_under_mujoco_4_the_cable_says_what_is_left(monkeypatch):
     message = r"'cable'; valid: one of geds, flex, hinge-chain \(mujoco 4\.0\.1 has no composite"
     with pytest.raises(InputError, match=message):
         make_hose("cable", SPEC, timestep=1e-3)
+    with pytest.raises(InputError, match=message):
+        make_world("no scene is read", "cable")
 
 
 def test_without_mujoco_geds_is_left(monkeypatch):

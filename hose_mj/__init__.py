@@ -4,8 +4,8 @@ Importing the package costs next to nothing; what it exports is loaded at first 
 
     import hose_mj
 
-    spec = hose_mj.HoseSpec.from_material(length=2.0, youngs_modulus=1e7, ...)
-    hose = hose_mj.make_hose("geds", spec)
+    spec = hose_mj.HoseSpec.ready("garden-hose-19mm", length=2.0)
+    hose = hose_mj.make_hose("geds", spec, timestep=0.01)
 """
 
 from __future__ import annotations
@@ -13,21 +13,57 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from hose_mj.version import __version__
+
 if TYPE_CHECKING:
+    from hose_mj.constraints.limits import Limits
+    from hose_mj.constraints.monitor import Monitor
     from hose_mj.errors import HoseError, InputError, StepError
+    from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+    from hose_mj.hoses.protocol import Hold, HoseModel
     from hose_mj.hoses.registry import make_hose
-    from hose_mj.hoses.spec import HoseSpec
+    from hose_mj.hoses.spec import Fitting, HoseSpec
+    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+    from hose_mj.tasks.registry import make_task
+    from hose_mj.world.registry import make_world
 
-__version__ = "0.1.0"
-
-__all__ = ["HoseError", "HoseSpec", "InputError", "StepError", "__version__", "make_hose"]
+__all__ = [
+    "ContactLaw",
+    "Fitting",
+    "Hold",
+    "HoseError",
+    "HoseModel",
+    "HoseSpec",
+    "InputError",
+    "Limits",
+    "Monitor",
+    "Obstacle",
+    "StepError",
+    "__version__",
+    "find_scene",
+    "make_hose",
+    "make_task",
+    "make_world",
+    "read_scene",
+]
 
 _HOMES = {
+    "ContactLaw": "hose_mj.hoses.obstacles",
+    "Fitting": "hose_mj.hoses.spec",
+    "Hold": "hose_mj.hoses.protocol",
     "HoseError": "hose_mj.errors",
+    "HoseModel": "hose_mj.hoses.protocol",
     "HoseSpec": "hose_mj.hoses.spec",
     "InputError": "hose_mj.errors",
+    "Limits": "hose_mj.constraints.limits",
+    "Monitor": "hose_mj.constraints.monitor",
+    "Obstacle": "hose_mj.hoses.obstacles",
     "StepError": "hose_mj.errors",
+    "find_scene": "hose_mj.scenes.mjcf.scene",
     "make_hose": "hose_mj.hoses.registry",
+    "make_task": "hose_mj.tasks.registry",
+    "make_world": "hose_mj.world.registry",
+    "read_scene": "hose_mj.scenes.mjcf.scene",
 }
 
 

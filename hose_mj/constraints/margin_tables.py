@@ -126,12 +126,12 @@ def make_tables(
     room = int(counts[-1]) * len(ids)
     gravity = float(np.linalg.norm(world.model.opt.gravity))
     return Tables(
-        radius=spec.radius,
+        radius=spec.outer_radius,
         tension=limits.find_tension(spec, gravity),
         stiffness=spec.axial_stiffness,
         lengthening=limits.max_lengthening,
         sight=limits.find_sight(max(footprint.radius for footprint in footprints)),
-        clearances=np.array(limits.find_clearances(spec.radius)),
+        clearances=np.array(limits.find_clearances(spec.outer_radius)),
         bounds=np.array(world.scene.bounds),
         starts=np.cumsum([0, *kinds]),
         segments=attachments,

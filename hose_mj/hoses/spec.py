@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 from hose_mj.errors import InputError
+from hose_mj.hoses import materials
 
+POISSON_RATIO = 0.3
+"""Where neither GJ nor a Poisson ratio is given, GJ = EI / (1 + this), as of a round section."""
 _MAY_BE_ZERO = {"torsional_stiffness", "damping_time", "drag"}
 _MAY_BE_NEGATIVE = {"rest_strain", "rest_curvature", "rest_torsion"}
 
@@ -52,9 +59,11 @@ class HoseSpec:
         bending_stiffness: EI (N m^2), about m1.
         second_bending_stiffness: EI about m2 (N m^2), for ribbons and flat cables; None for a hose
             that bends alike in every direction.
-        torsional_stiffness: GJ (N m^2).
+        torsional_stiffness: GJ (N m^2); left out (None) that of a round section of a material with
+            `POISSON_RATIO`, EI / 1.3; 0 for a hose that twists freely.
         linear_density: mass per rest length (kg/m); the thesis's mu times A.
-        radius: outer radius (m), for drawing, contact and the section that MuJoCo implies.
+        outer_radius: (m), for drawing, contact and the section that MuJoCo implies. `radius`, its
+            old name, goes on for one release with a DeprecationWarning.
         rest_strain: stretch strain at which the hose is free of tension.
         rest_curvature: K1 at which the hose is free of moment (1/m), signed.
         rest_torsion: twist per length at which it is free of torque (1/m); with a rest curvature
@@ -71,9 +80,9 @@ class HoseSpec:
     axial_stiffness: float
     bending_stiffness: float
     second_bending_stiffness: float | None = None
-    torsional_stiffness: float = 0.0
+    torsional_stiffness: float = None  # type: ignore[assignment]  # a number once made
     linear_density: float
-    radius: float = 0.01
+    outer_radius: float = 0.01
     rest_strain: float = 0.0
     rest_curvature: float = 0.0
     rest_torsion: float = 0.0
@@ -82,6 +91,10 @@ class HoseSpec:
     fittings: tuple[Fitting, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.torsional_stiffness is None:
+            check_number("bending_stiffness", self.bending_stiffness)
+            round_section = self.bending_stiffness / (1.0 + POISSON_RATIO)
+            object.__setattr__(self, "torsional_stiffness", round_section)
         for field in fields(self):
             if field.name == "fittings":
                 continue
@@ -151,10 +164,36 @@ class HoseSpec:
             bending_stiffness=youngs_modulus * second_moment,
             torsional_stiffness=shear_modulus * 2 * second_moment,
             linear_density=density * area,
-            radius=outer_radius,
+            outer_radius=outer_radius,
             damping_time=damping_time,
             drag=drag,
         )
+
+    @classmethod
+    def ready(cls, name: str, *, length: float) -> HoseSpec:
+        """Returns a ready hose of assets/materials.toml, where each number has its source.
+
+        Args:
+            name: a key of `list_ready`, such as "garden-hose-19mm".
+            length: rest length (m).
+
+        Raises:
+            InputError: an unknown name, which lists the known ones, or a length out of range.
+        """
+        check_number("length", length)
+        hose = materials.find_entry(materials.read_catalogue().hoses, name, "ready hose")
+        return cls(length=length, **complete_section(hose.numbers))  # type: ignore[arg-type]
+
+    @staticmethod
+    def list_ready() -> dict[str, str]:
+        """Returns the names of the ready hoses and a line about each."""
+        return {name: hose.title for name, hose in materials.read_catalogue().hoses.items()}
+
+    @property
+    def radius(self) -> float:
+        """Deprecated: `outer_radius`."""
+        _warn_of_radius("HoseSpec.radius", stacklevel=3)
+        return self.outer_radius
 
     @property
     def mass(self) -> float:
@@ -173,6 +212,71 @@ class HoseSpec:
             self.second_bending_stiffness in (None, self.bending_stiffness)
             and self.rest_curvature == 0.0
         )
+
+
+def _warn_of_radius(old: str, stacklevel: int) -> None:
+    text = f"{old} is deprecated and goes with the next release: write outer_radius"
+    warnings.warn(text, DeprecationWarning, stacklevel=stacklevel)
+
+
+def _accept_radius(make: Any) -> Any:
+    """HoseSpec's __init__ with the old name of outer_radius, which wins: `replace` gives both."""
+
+    @functools.wraps(make)
+    def make_with_radius(self: HoseSpec, **values: Any) -> None:
+        if "radius" in values:
+            _warn_of_radius("HoseSpec(radius=...)", stacklevel=3)
+            values["outer_radius"] = values.pop("radius")
+        make(self, **values)
+
+    return make_with_radius
+
+
+HoseSpec.__init__ = _accept_radius(HoseSpec.__init__)  # type: ignore[method-assign]
+
+
+def complete_section(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Returns what diameters and a material make, each number replaced by the one stated.
+
+    Args:
+        numbers: SI, by key of `materials.MATERIAL_KEYS` and `HOSE_KEYS`.
+
+    Returns:
+        arguments of `HoseSpec` but for the length; some may be missing, GJ only without EI.
+
+    Raises:
+        InputError: a number out of range; its `thing` is the key.
+    """
+    stated = {
+        field.name: numbers[field.name] for field in fields(HoseSpec) if field.name in numbers
+    }
+    made = {}
+    if "outer_diameter" in numbers:
+        outer, inner = numbers["outer_diameter"], numbers.get("inner_diameter", 0.0)
+        if inner >= outer:
+            raise InputError("inner_diameter", inner, f"below outer_diameter, {outer:g} m")
+        made["outer_radius"] = outer / 2.0
+        if {"youngs_modulus", "poisson_ratio", "density"} <= numbers.keys():
+            tube = HoseSpec.from_material(
+                length=1.0,
+                youngs_modulus=numbers["youngs_modulus"],
+                poisson_ratio=numbers["poisson_ratio"],
+                density=numbers["density"],
+                outer_radius=outer / 2.0,
+                inner_radius=inner / 2.0,
+            )
+            contents = numbers.get("contents_density", 0.0) * math.pi * inner**2 / 4.0
+            made |= {
+                "axial_stiffness": tube.axial_stiffness,
+                "bending_stiffness": tube.bending_stiffness,
+                "torsional_stiffness": tube.torsional_stiffness,
+                "linear_density": tube.linear_density + contents,
+            }
+    made |= stated
+    if "bending_stiffness" in made:
+        ratio = numbers.get("poisson_ratio", POISSON_RATIO)
+        made.setdefault("torsional_stiffness", made["bending_stiffness"] / (1.0 + ratio))
+    return made
 
 
 def check_number(

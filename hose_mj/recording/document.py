@@ -18,7 +18,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
-import hose_mj
+from hose_mj import version
 from hose_mj.errors import InputError
 
 _SHARED_ARGUMENTS = {"json", "seed"}
@@ -55,7 +55,7 @@ def make_document(
     values = dict(asdict(settings) if is_dataclass(settings) else settings)  # type: ignore[arg-type]
     document: dict[str, Any] = {
         "command": command,
-        "version": hose_mj.__version__,
+        "version": version.__version__,
         "revision": find_revision(),
         "machine": describe_machine(),
         "seed": values.get("seed") if seed is None else seed,
@@ -113,7 +113,7 @@ def find_revision() -> str | None:
 
     None for an installed copy, even one in a virtual environment inside another repository.
     """
-    root = Path(hose_mj.__file__).resolve().parent.parent
+    root = Path(version.__file__).resolve().parent.parent
     top = _ask_git(root, "rev-parse", "--show-toplevel")
     commit = _ask_git(root, "rev-parse", "--verify", "HEAD")
     if top is None or commit is None or Path(top).resolve() != root:

@@ -221,7 +221,7 @@ def _compile_shown(scene: Scene) -> mujoco.MjModel:
         body = spec.worldbody.add_body(name=f"{HOSE}{k}", mocap=True)
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            size=[scene.spec.radius, half, 0.0],
+            size=[scene.spec.outer_radius, half, 0.0],
             contype=0,
             conaffinity=0,
         )

@@ -30,7 +30,7 @@ def draw_hose(scn: mujoco.MjvScene, world: World, limit: float, n_pieces: int = 
     points = world.position(arcs)
     colors = color_pieces(world, arcs, limit)
     n = int(min(n_pieces, scn.maxgeom - scn.ngeom))
-    radius = world.scene.spec.radius
+    radius = world.scene.spec.outer_radius
     for k in range(n):
         geom = scn.geoms[scn.ngeom + k]
         mujoco.mjv_initGeom(geom, _CAPSULE, np.zeros(3), np.zeros(3), np.eye(3).ravel(), colors[k])

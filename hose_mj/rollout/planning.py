@@ -50,7 +50,7 @@ class Cells:
         arcs = np.linspace(0.0, length, HOSE_SAMPLES)
         own = np.maximum(3.0 * self._radius, 0.5 * (length - world.arc_lengths[1]))
         covered = world.position(arcs[arcs < world.arc_lengths[0] - own])
-        wide = np.full(len(covered), self._radius + world.scene.spec.radius)
+        wide = np.full(len(covered), self._radius + world.scene.spec.outer_radius)
         return np.concatenate([others, covered]), np.concatenate([apart, wide])
 
     def is_free(self, cell: Cell) -> bool:

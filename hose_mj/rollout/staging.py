@@ -124,7 +124,7 @@ def make_stage(
         robots=tuple(robot.name for robot in scene.robots),
         goal=cast.make_goal(scene.goal.site),
         arc_lengths=np.linspace(0.0, scene.spec.length, n_points),
-        hose_radius=scene.spec.radius,
+        hose_radius=scene.spec.outer_radius,
         tension_limit=find_tension_limit(world, monitor),
         margins=list_margins(monitor),
         n_control_points=len(read_control_points(world)),

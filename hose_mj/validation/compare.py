@@ -9,6 +9,7 @@ import numpy as np
 
 from hose_mj.checks import Check
 from hose_mj.hoses.protocol import Array
+from hose_mj.hoses.registry import MODELS
 from hose_mj.validation.case import Case, Reference
 from hose_mj.validation.run import (
     EQUAL_ERRORS,
@@ -21,7 +22,7 @@ from hose_mj.validation.run import (
 )
 from hose_mj.validation.settings import Grid, list_ladders
 
-INEXTENSIBLE = ("cable", "flex", "hinge-chain")
+INEXTENSIBLE = tuple(model for model, entry in MODELS.items() if not entry.stretches)
 
 
 @dataclass(frozen=True)

@@ -36,11 +36,12 @@ def make_capstan() -> Case:
         length=length,
         axial_stiffness=2e3,
         bending_stiffness=1e-5,
+        torsional_stiffness=0.0,
         linear_density=0.1,
-        radius=0.005,
+        outer_radius=0.005,
         damping_time=0.01,
     )
-    bend = drum + spec.radius
+    bend = drum + spec.outer_radius
     leg = 0.5 * (length - math.pi * bend)
 
     def curve(s: Array) -> Array:
@@ -119,7 +120,7 @@ def _tow_chain(n_links: int, n_increments: int) -> Array:
     shapes = tow_chain(_TOWED, TOW_FRICTION, start, path, slip)
     every = n_increments // TOW_SAMPLES
     seen = np.concatenate([start[None], shapes[every - 1 :: every]])[:, :: n_links // 10]
-    heights = np.full((*seen.shape[:2], 1), _TOWED.radius)
+    heights = np.full((*seen.shape[:2], 1), _TOWED.outer_radius)
     return np.concatenate([seen, heights], axis=2).reshape(len(seen), -1)
 
 
@@ -133,7 +134,7 @@ def compute_tow() -> Reference:
 
 def make_floor_tow() -> Case:
     """A hose towed slowly along a figure of eight on a rough floor."""
-    height = _TOWED.radius * (1.0 - SINK)
+    height = _TOWED.outer_radius * (1.0 - SINK)
 
     def lay(hose: HoseModel) -> list[Hold]:
         hose.reset([[0.0, 0.0, height], [LENGTH, 0.0, height]])

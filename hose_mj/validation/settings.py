@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hose_mj.hoses.protocol import HoseModel
-from hose_mj.hoses.registry import make_hose
+from hose_mj.hoses.registry import MODELS, find_model, make_hose
 from hose_mj.validation.case import Case
 
 STEP_UNIT = 0.02
@@ -50,28 +50,28 @@ class Setting:
     @property
     def label(self) -> str:
         """One line that tells this setting from all others of a case."""
-        size = "control points" if self.model == "geds" else "segments"
+        size = find_model(self.model).resolution.replace("_", " ")
         step = "" if self.timestep is None else f", {1e3 * self.timestep:g} ms"
         clamp = {None: "", True: ", clamp-corrected", False: ""}[self.clamp_corrected]
         return f"{self.model}, {self.resolution} {size}{step}, {self.scheme}{clamp}"
 
     def make(self, case: Case, **options: Any) -> HoseModel:
         """Makes the hose of a case, laid into its initial state by the caller."""
-        scheme = self.scheme.removesuffix(", planar")
+        entry = find_model(self.model)
         options.update(gravity=case.gravity, timestep=self.timestep or 0.005)
-        if self.model == "geds":
-            options.update(control_points=self.resolution, plane="xz" if self.planar else None)
-            options.setdefault("scheme", "bdf2" if self.timestep is None else scheme)
-        else:
-            options.update(segments=self.resolution, clamp_correction=bool(self.clamp_corrected))
-            if self.timestep is not None and self.model != "flex":
-                options.update(integrator=scheme)
+        options[entry.resolution] = self.resolution
+        if entry.plane:
+            options[entry.plane] = "xz" if self.planar else None
+        if entry.has_clamp_correction:
+            options.update(clamp_correction=bool(self.clamp_corrected))
+        if entry.scheme and self.timestep is not None:
+            options.setdefault(entry.scheme, self.scheme.removesuffix(", planar"))
         if self.model == "cable" and self.timestep is not None and case.planar:
             # In a plane nothing twists: less torsional stiffness allows the cable larger steps.
             options.update(torsional_stiffness=CABLE_TWIST * case.spec.bending_stiffness)
         if case.obstacles:
             options.update(obstacles=case.obstacles)
-            if self.model == "geds":
+            if entry.contact_law:
                 options.update(contact_law=case.contact_law)
         return make_hose(self.model, case.spec, **options)
 
@@ -113,10 +113,8 @@ class Grid:
 
 
 _SCHEMES = {
-    "geds": ("bdf2", "bdf2, planar"),
-    "cable": ("euler", "rk4"),
-    "flex": ("discrete",),
-    "hinge-chain": ("euler", "rk4", "discrete"),
+    model: (*entry.schemes, *(f"{scheme}, planar" for scheme in entry.schemes if entry.plane))
+    for model, entry in MODELS.items()
 }
 FULL = Grid(
     static={
@@ -159,7 +157,6 @@ QUICK = Grid(
 )
 
 
-_STATICS = {"geds": "statics", "flex": "newton on vertices"}
 ListSteps = Callable[[str, str, int, Case, Grid], list[float]]
 """Time steps to try, from a model, a scheme, a resolution, a case and a grid."""
 
@@ -167,7 +164,7 @@ ListSteps = Callable[[str, str, int, Case, Grid], list[float]]
 def list_static(case: Case, models: tuple[str, ...], grid: Grid) -> Iterator[Setting]:
     """Yields the settings of a static case."""
     for model in models:
-        scheme = _STATICS.get(model, "newton on joint angles")
+        scheme = find_model(model).statics
         for resolution in case.resolutions.get(model, grid.static[model]):
             for corrected in _clamps(model, case):
                 yield Setting(model, scheme, resolution, corrected)
@@ -202,7 +199,8 @@ def list_ladders(
 
 
 def _clamps(model: str, case: Case) -> tuple[bool | None, ...]:
-    return (None,) if model == "geds" or not case.clamped else (True, False)
+    corrects = find_model(model).has_clamp_correction and case.clamped
+    return (True, False) if corrects else (None,)
 
 
 def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:

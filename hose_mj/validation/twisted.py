@@ -237,7 +237,7 @@ def make_coil() -> Case:
         bending_stiffness=stiffness,
         torsional_stiffness=twist_stiffness,
         linear_density=0.05,
-        radius=1e-3,
+        outer_radius=1e-3,
         rest_curvature=turning * math.cos(pitch_angle),
         rest_torsion=turning * rise,
     )

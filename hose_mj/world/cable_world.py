@@ -91,7 +91,7 @@ class CableWorld(MujocoWorld):
     ) -> mujoco.MjSpec:
         maker, bodies = self._kind.make_chain(self._layout, None)
         h = self._layout.segment_length
-        ChainMass.of_hose(self._layout, spec.linear_density, spec.radius).write(bodies)
+        ChainMass.of_hose(self._layout, spec.linear_density, spec.outer_radius).write(bodies)
         for body, bit in zip(bodies, contact.bits, strict=True):
             for geom in body.geoms:
                 contact.write(geom, int(bit))
@@ -99,7 +99,7 @@ class CableWorld(MujocoWorld):
             ball = body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_SPHERE,
                 pos=[along, 0.0, 0.0],
-                size=[spec.radius, 0.0, 0.0],
+                size=[spec.outer_radius, 0.0, 0.0],
                 group=_HIDDEN,
             )
             contact.write(ball, contact.plane_bit)
@@ -158,7 +158,7 @@ def find_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffness:
     bend = h**2 / (2.0 * math.sqrt(3.0)) * math.sqrt(density / stiffness)
     steps = [spec.damping_time + math.hypot(spec.damping_time, bend)]
     if torsional_stiffness > 0.0:
-        twist = h * spec.radius * math.sqrt(density / (2.0 * torsional_stiffness))
+        twist = h * spec.outer_radius * math.sqrt(density / (2.0 * torsional_stiffness))
         relaxation = spec.damping_time * stiffness / torsional_stiffness
         steps.append(relaxation + math.hypot(relaxation, twist))
     return min(steps)

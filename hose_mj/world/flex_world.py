@@ -7,8 +7,7 @@ import numpy as np
 
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.mujoco.chain_holds import find_rows
-from hose_mj.hoses.mujoco.flex_layout import FlexLayout
-from hose_mj.hoses.mujoco.flex_motion import FlexMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion
 from hose_mj.hoses.mujoco.flex_rod import add_edges, make_rod
 from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.hoses.spec import HoseSpec
@@ -73,7 +72,7 @@ class FlexWorld(MujocoWorld):
         changes = np.flatnonzero(np.diff(contact.bits)) + 1
         for k, run in enumerate(np.split(np.arange(len(contact.bits)), changes)):
             vertices = range(int(run[0]), int(run[-1]) + 2)
-            touching = add_edges(maker, f"contact{k}", vertices, spec.radius)
+            touching = add_edges(maker, f"contact{k}", vertices, spec.outer_radius)
             contact.write(touching, int(contact.bits[run[0]]) | contact.plane_bit)
         for k, vertex in enumerate(self._held):
             maker.body(f"v{vertex}").add_site(name=f"hold{k}")

@@ -49,7 +49,7 @@ class HoseTouch:
         self._measured = Distances.none(len(hose.contact_arc_lengths))
         self._measured_forces = np.zeros((len(hose.contact_arc_lengths), 3))
         if len(self.geoms.measured):
-            reach = _REACH * hose.spec.radius
+            reach = _REACH * hose.spec.outer_radius
             low, high = self.geoms.measured_skips.T[:, :, None]
             s = hose.contact_arc_lengths
             touched = (s < low) | (s > high)

@@ -116,7 +116,7 @@ def _judge(hose: GedsHose, arc_lengths: Array, points: Array, earlier: Array) ->
 
     What it would stand in counts, then whether it would cross itself.
     """
-    radius = hose.spec.radius
+    radius = hose.spec.outer_radius
     cost = 1e3 * (0.99 * radius - _find_clearance(hose, arc_lengths, points)) / radius
     apart = np.linalg.norm(points[None, _NEAR:] - earlier[:-_NEAR, None], axis=2)
     if apart.min(initial=np.inf) < 2.0 * radius:
@@ -130,7 +130,7 @@ def _find_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:
     for row, obstacle in zip(distances, hose.obstacles, strict=True):
         low, high = obstacle.skips
         row[(arc_lengths >= low) & (arc_lengths <= high)] = np.inf
-    return float(distances.min(initial=0.99 * hose.spec.radius))
+    return float(distances.min(initial=0.99 * hose.spec.outer_radius))
 
 
 def _draw_arc(start: Array, chord: Array, length: float, parts: Array, bulge: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.mujoco.chain_obstacles import IMPEDANCE_RATIO
+from hose_mj.hoses.mujoco.chain_settings import IMPEDANCE_RATIO
 from hose_mj.hoses.spec import check_number
 from hose_mj.scenes.mjcf.scene import Scene
 

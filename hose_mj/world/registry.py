@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.registry import check_model
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.cable_world import CableWorld
 from hose_mj.world.flex_world import FlexWorld
@@ -28,6 +29,7 @@ def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -
     """
     if model not in WORLDS:
         raise InputError("model", model, "one of " + ", ".join(WORLDS))
+    check_model(model)
     if not isinstance(scene, Scene):
         scene = read_scene(find_scene(scene))
     return WORLDS[model](scene, **options)

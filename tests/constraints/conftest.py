@@ -108,7 +108,7 @@ def floor(floors):
 SCENE = """<mujoco>
   <custom>
     <numeric name="hose_length" data="{length}"/>
-    <numeric name="hose_radius" data="0.01"/>
+    <numeric name="hose_outer_radius" data="0.01"/>
     <numeric name="hose_axial_stiffness" data="1e4"/>
     <numeric name="hose_bending_stiffness" data="0.01"/>
     <numeric name="hose_torsional_stiffness" data="0.01"/>

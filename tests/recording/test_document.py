@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import hose_mj
+from hose_mj import version
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording import document
@@ -35,7 +35,7 @@ def test_top_level_is_the_contract():
         *("command", "version", "revision", "machine", "seed", "settings", "checks", "records")
     ]
     assert made["command"] == "compare"
-    assert made["version"] == hose_mj.__version__
+    assert made["version"] == version.__version__
     assert made["seed"] == 7
     assert made["settings"] == {"length": 2.0, "out": Path("out")}
     assert set(made["machine"]) == {"cpu", "cores", "os", "python"}
@@ -165,7 +165,7 @@ def checkout(tmp_path, monkeypatch):
     run_git(tmp_path, "init", "--quiet")
     run_git(tmp_path, "add", ".")
     run_git(tmp_path, "commit", "--quiet", "-m", "first")
-    monkeypatch.setattr(hose_mj, "__file__", str(package / "__init__.py"))
+    monkeypatch.setattr(version, "__file__", str(package / "__init__.py"))
     return tmp_path
 
 
@@ -180,7 +180,7 @@ def test_no_revision_for_a_copy_installed_inside_another_repository(checkout, mo
     installed = checkout / ".venv" / "hose_mj" / "__init__.py"
     installed.parent.mkdir(parents=True)
     installed.write_text("")
-    monkeypatch.setattr(hose_mj, "__file__", str(installed))
+    monkeypatch.setattr(version, "__file__", str(installed))
     assert document.find_revision() is None
 
 

@@ -24,7 +24,7 @@ def test_capsules_follow_the_hose(world):
     for geom, start, end in zip(scn.geoms[3:43], points[:-1], points[1:], strict=True):
         assert geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE
         assert geom.pos == pytest.approx(0.5 * (start + end), abs=1e-6)
-        assert geom.size[0] == pytest.approx(world.scene.spec.radius)
+        assert geom.size[0] == pytest.approx(world.scene.spec.outer_radius)
         assert 2.0 * geom.size[2] == pytest.approx(np.linalg.norm(end - start), rel=1e-4)
         axis = geom.mat.reshape(3, 3)[:, 2]
         assert abs(axis @ (end - start)) == pytest.approx(np.linalg.norm(end - start), rel=1e-5)

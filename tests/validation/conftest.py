@@ -12,7 +12,13 @@ from hose_mj.validation.case import Case, Motion
 from hose_mj.validation.run import Outcome
 from hose_mj.validation.settings import Setting
 
-SPEC = HoseSpec(length=1.0, axial_stiffness=1e4, bending_stiffness=0.05, linear_density=0.1)
+SPEC = HoseSpec(
+    length=1.0,
+    axial_stiffness=1e4,
+    bending_stiffness=0.05,
+    torsional_stiffness=0.0,
+    linear_density=0.1,
+)
 
 
 class FakeHose:

@@ -7,7 +7,13 @@ from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation.contacts import TOW_SAMPLES, compute_tow, find_tow
 from hose_mj.validation.quasistatic import tow_chain
 
-SPEC = HoseSpec(length=1.0, axial_stiffness=100.0, bending_stiffness=1e-8, linear_density=0.1)
+SPEC = HoseSpec(
+    length=1.0,
+    axial_stiffness=100.0,
+    bending_stiffness=1e-8,
+    torsional_stiffness=0.0,
+    linear_density=0.1,
+)
 DRAG = 0.5 * 0.1 * 9.81
 """Friction per length at mu = .5 (N/m)."""
 
@@ -41,7 +47,13 @@ def test_a_pull_too_weak_to_reach_the_end_moves_only_a_part():
 def test_a_limp_chain_towed_sideways_follows_the_tractrix():
     # Beyond the bend a limp inextensible chain slides along itself: every point follows the one
     # ahead, and far from the corner the free end has not moved sideways.
-    limp = HoseSpec(length=1.0, axial_stiffness=1e4, bending_stiffness=1e-9, linear_density=0.1)
+    limp = HoseSpec(
+        length=1.0,
+        axial_stiffness=1e4,
+        bending_stiffness=1e-9,
+        torsional_stiffness=0.0,
+        linear_density=0.1,
+    )
     path = np.stack([np.ones(400), 0.3 * np.arange(1, 401) / 400], axis=1)
     (*_, nodes) = tow_chain(limp, 0.5, make_straight(100), path, 1e-6)
     lengths = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
@@ -53,7 +65,13 @@ def test_a_limp_chain_towed_sideways_follows_the_tractrix():
 def test_a_stiff_chain_turns_about_a_point_inside():
     # A rigid rod on a rough floor pushed sideways at its end turns about the point at 1 / sqrt 2 of
     # its length from there: the moment of friction about the pushed end vanishes.
-    stiff = HoseSpec(length=1.0, axial_stiffness=1e4, bending_stiffness=1e4, linear_density=0.1)
+    stiff = HoseSpec(
+        length=1.0,
+        axial_stiffness=1e4,
+        bending_stiffness=1e4,
+        torsional_stiffness=0.0,
+        linear_density=0.1,
+    )
     path = np.stack([np.ones(20), 1e-3 * np.arange(1, 21) / 20], axis=1)
     (*_, nodes) = tow_chain(stiff, 0.5, make_straight(200), path, 1e-8)
     still = np.interp(0.0, nodes[:, 1], np.linspace(0.0, 1.0, 201))

@@ -22,7 +22,7 @@ TEXT = """
   <compiler {compiler}/><option timestep="0.002"><flag {flag}/></option>
   <default><joint damping="3" armature="0.5"/><geom contype="4" solref="0.05 1"/></default>
   <custom>
-    <numeric name="hose_length" data="1.0"/><numeric name="hose_radius" data="0.01"/>
+    <numeric name="hose_length" data="1.0"/><numeric name="hose_outer_radius" data="0.01"/>
     <numeric name="hose_axial_stiffness" data="5e3"/>
     <numeric name="hose_bending_stiffness" data="1e-2"/>
     <numeric name="hose_linear_density" data="0.2"/>

@@ -20,7 +20,7 @@ TEXT = """
 <mujoco>
   <option timestep="0.002" gravity="{gravity}"/>
   <custom>
-    <numeric name="hose_length" data="1.0"/><numeric name="hose_radius" data="0.01"/>
+    <numeric name="hose_length" data="1.0"/><numeric name="hose_outer_radius" data="0.01"/>
     <numeric name="hose_axial_stiffness" data="5e3"/>
     <numeric name="hose_bending_stiffness" data="{bend}"/>
     <numeric name="hose_torsional_stiffness" data="8e-3"/>

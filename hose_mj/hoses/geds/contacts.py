@@ -248,7 +248,7 @@ class ContactSet:
     def _make_law(self) -> Array:
         law, spec = self.law, self._spec
         weight = spec.linear_density * self._pull
-        k = weight / (SINK * spec.radius) if law.stiffness is None else law.stiffness
+        k = weight / (SINK * spec.outer_radius) if law.stiffness is None else law.stiffness
         width = weight / k if law.width is None else law.width
         damping = law.damping_time
         if damping is None:
@@ -259,7 +259,7 @@ class ContactSet:
         numbers[contact_law.WIDTH] = width
         numbers[contact_law.DAMPING] = damping
         numbers[contact_law.SLIP] = law.slip_speed
-        numbers[contact_law.RADIUS] = spec.radius
+        numbers[contact_law.RADIUS] = spec.outer_radius
         numbers[contact_law.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
         if law.self_contact:
             numbers[contact_law.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2
@@ -272,7 +272,7 @@ class ContactSet:
         span = self._spline.length / n_spans
         count = self.law.points_per_span
         if count is None:
-            wanted = int(np.ceil(span / self._spec.radius)) if self.law.self_contact else 0
+            wanted = int(np.ceil(span / self._spec.outer_radius)) if self.law.self_contact else 0
             count = min(max(wanted, 3), MOST_POINTS)
         nodes, weights = np.polynomial.legendre.leggauss(count)
         at = ((np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span).ravel()

@@ -46,7 +46,7 @@ class HosePair:
         if first is second:
             raise InputError("second", second, "another hose (self-contact is in ContactLaw)")
         if capsules is None:
-            capsules = min(int(np.ceil(second.spec.length / (2.0 * second.spec.radius))), 200)
+            capsules = min(int(np.ceil(second.spec.length / (2.0 * second.spec.outer_radius))), 200)
         check_count("capsules", capsules, 1, 1000)
         self.first, self.second, self.friction = first, second, float(friction)
         self._places = np.linspace(0.0, second.spec.length, capsules + 1)
@@ -60,7 +60,7 @@ class HosePair:
             points = self.second.position(self._places)
             speeds = self.second.velocity(self._places)
             self.first.set_neighbour(
-                points, speeds, self.second.spec.radius, self.friction, self._stiffness
+                points, speeds, self.second.spec.outer_radius, self.friction, self._stiffness
             )
             self.first.step()
             self.second.set_push(self._places, self.first.neighbour_forces())

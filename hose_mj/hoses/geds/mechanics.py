@@ -73,7 +73,7 @@ def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> solver
     quarters = make_cells(basis.MASS_WEIGHTS, n_spans, spec.length)
     mass = basis.make_mass(knots, average_density(spec, quarters))
     # Of a solid round section about its axis.
-    gyration = 0.5 * spec.radius**2
+    gyration = 0.5 * spec.outer_radius**2
     return solver.Hose(tables, elasticity, mass, gyration, float(spec.drag / spec.linear_density))
 
 

@@ -11,10 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_kind import ChainKind
-from hose_mj.hoses.mujoco.chain_layout import ChainLayout, conjugate, multiply, rotation_matrix
-from hose_mj.hoses.mujoco.chain_obstacles import check_obstacles
-from hose_mj.hoses.mujoco.chain_settings import ChainSettings
+from hose_mj.hoses.mujoco.chain_layout import (
+    ChainKind,
+    ChainLayout,
+    conjugate,
+    multiply,
+    rotation_matrix,
+)
+from hose_mj.hoses.mujoco.chain_settings import ChainSettings, check_obstacles
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
@@ -125,7 +129,7 @@ class BallJoints(ChainKind):
         self, layout: ChainLayout, root: tuple[Array, Array] | None
     ) -> tuple[mujoco.MjSpec, list[Any]]:
         """The composite, with its nodes (single precision in MuJoCo's compiler) set exactly."""
-        h, second_moment = layout.segment_length, math.pi * self.spec.radius**4 / 4
+        h, second_moment = layout.segment_length, math.pi * self.spec.outer_radius**4 / 4
         xml = _XML.format(
             nodes=layout.segments + 1,
             size=h * layout.segments,
@@ -133,7 +137,7 @@ class BallJoints(ChainKind):
             twist=self.stiffness[0] / (2 * second_moment),
             bend=self.stiffness[1] / second_moment,
             damping=self.spec.damping_time * self.stiffness[1] / h,
-            radius=self.spec.radius,
+            radius=self.spec.outer_radius,
         )
         maker = mujoco.MjSpec.from_string(xml)
         bodies = [body for body in maker.bodies if body.name.startswith("B_")]

@@ -7,15 +7,262 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import mujoco
+import numpy as np
+
 from hose_mj.errors import InputError
-from hose_mj.hoses.mujoco.chain_holds import Held
-from hose_mj.hoses.mujoco.chain_kind import ChainKind
-from hose_mj.hoses.mujoco.chain_layout import ChainLayout, rotation_matrix
-from hose_mj.hoses.mujoco.chain_model import ChainModel
-from hose_mj.hoses.mujoco.chain_settings import ChainSettings
+from hose_mj.hoses.mujoco.chain_holds import (
+    Held,
+    Load,
+    add_equality,
+    check_segments,
+    compute_equality_reaction,
+    compute_root_reaction,
+    make_layout,
+)
+from hose_mj.hoses.mujoco.chain_layout import (
+    ChainKind,
+    ChainLayout,
+    rotation_matrix,
+    transport_frames,
+    turn_frame,
+)
+from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
+from hose_mj.hoses.mujoco.chain_settings import ChainSettings, add_obstacles
+from hose_mj.hoses.mujoco.chain_statics import (
+    BodyPoint,
+    ChainSystem,
+    StaticChain,
+    StaticHold,
+    StaticLoad,
+)
 from hose_mj.hoses.mujoco.hose import MujocoHose
-from hose_mj.hoses.protocol import Array
+from hose_mj.hoses.mujoco.model import Motion, MujocoModel
+from hose_mj.hoses.mujoco.statics import linearize, solve_equilibrium
+from hose_mj.hoses.protocol import Array, Energies, Linearization, Momentum, Reaction
 from hose_mj.hoses.spec import HoseSpec
+
+_ADVICE = (
+    "the elastic forces are explicit and unstable; try a smaller timestep, fewer segments or a "
+    "lower torsional stiffness"
+)
+
+
+class ChainModel(MujocoModel):
+    """A compiled chain with its holds.
+
+    Args:
+        kind: what the joints are.
+        spec: what the hose is made of.
+        settings: numerics.
+        held: what holds it; a rigid one holds the first segment.
+
+    Attributes:
+        layout: arc lengths of the nodes.
+        bodies: body ids of the segments (N,).
+        mass: of the segments.
+    """
+
+    def __init__(
+        self, kind: ChainKind, spec: HoseSpec, settings: ChainSettings, held: Sequence[Held]
+    ) -> None:
+        self.kind = kind
+        correct = settings.clamp_correction
+        self.layout = make_layout(spec.length, settings.segments, held, clamp_correction=correct)
+        self.mass = ChainMass.of_hose(self.layout, spec.linear_density, spec.outer_radius)
+        self.rooted = any(item.rigid for item in held)
+        root = next((self._root_pose(item) for item in held if item.rigid), None)
+        maker, bodies = kind.make_chain(self.layout, root)
+        settings.apply(maker.option)
+        add_obstacles(maker, bodies, settings.obstacles, settings.timestep)
+        self.mass.write(bodies)
+        for item in held:
+            if not item.rigid:
+                (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
+                add_equality(maker, bodies[index], along, item, settings.hold_options())
+        check_segments(self.layout, held)
+        try:
+            model = maker.compile()
+        except ValueError as error:
+            light = f"heavier segments than {settings.segments} of this hose"
+            valid = f"{light} (MuJoCo: {' '.join(str(error).split())})"
+            raise InputError("linear_density", spec.linear_density, valid) from error
+        super().__init__(model, settings.lead, _ADVICE)
+        self.bodies = np.array([self.model.body(body.name).id for body in bodies])
+        self._motion: ChainMotion | None = None
+
+    def _root_pose(self, held: Held) -> tuple[Array, Array]:
+        """First node and frame of a first segment that a clamp at s = 0 makes part of the world."""
+        tangent = rotation_matrix(held.frame)[:, 0]
+        return held.position + self.layout.nodes[0] * tangent, held.frame
+
+    def point(self, arc_length: float) -> BodyPoint:
+        """The body and place in it of a point of the hose."""
+        (index,), (along,) = self.layout.locate(np.array([arc_length]))
+        return BodyPoint(int(self.bodies[index]), np.array([along, 0.0, 0.0]))
+
+    # State.
+
+    def set_state(self, start: Array, frames: Array, velocity: Array, spins: Array) -> None:
+        """Poses and moves the chain; of a rooted one the first frame and spin are not used."""
+        self.data.qpos[:] = self.kind.to_qpos(start, frames, self.rooted)
+        self.data.qvel[:] = self.kind.to_qvel(velocity, spins, frames, self.rooted)
+        self.forget()
+
+    @property
+    def nodes(self) -> Array:
+        """Rest arc lengths of the nodes (N + 1,), m; the first may be below 0."""
+        return self.layout.nodes
+
+    def lay(self, points: Array, speeds: Array | None) -> None:
+        """The first node is on its point; each segment points along the chord of its nodes."""
+        still = np.zeros((self.layout.segments, 3))
+        frames = transport_frames(points, self.kind.base_frame)
+        self.set_state(points[0], frames, still[0], still)
+        if speeds is not None:
+            self.fit_velocity(speeds)
+
+    def take_over(self, old: Motion, held: Sequence[Held]) -> None:
+        """Lays and moves the chain as another one; a rigid clamp's target comes first."""
+        assert isinstance(old, ChainMotion)
+        layout = self.layout
+        nearest, _ = old.layout.locate((layout.nodes[:-1] + layout.nodes[1:]) / 2)
+        points = old.position(layout.nodes)
+        chords = np.diff(points, axis=0)
+        chords /= np.linalg.norm(chords, axis=1, keepdims=True)
+        frames = np.array(
+            [turn_frame(old.frames[k], chord) for k, chord in zip(nearest, chords, strict=True)]
+        )
+        velocity, spins = old.velocity(layout.nodes[:1])[0], old.spins[nearest]
+        for item in held:
+            if item.rigid:
+                frames[0], spins[0], velocity = item.frame, 0.0, np.zeros(3)
+        self.set_state(points[0], frames, velocity, spins)
+
+    def fit_velocity(self, speeds: Array) -> None:
+        """Sets qvel such that the velocities of the nodes (N + 1, 3) are met in least squares."""
+        motion = self.motion()
+        nodes = motion.position(self.layout.nodes)
+        rows = np.zeros((len(nodes), 3, self.model.nv))
+        for k, node in enumerate(nodes):
+            body = self.bodies[min(k, len(self.bodies) - 1)]
+            mujoco.mj_jac(self.model, self.data, rows[k], None, node, body)
+        system = rows.reshape(-1, self.model.nv)
+        self.data.qvel[:] = np.linalg.lstsq(system, speeds.ravel(), rcond=1e-10)[0]
+        self.forget()
+
+    def motion(self) -> ChainMotion:
+        """How the chain lies and moves now."""
+        if self._motion is None:
+            self._motion = ChainMotion.read(self.model, self.data, self.layout, self.bodies)
+        return self._motion
+
+    def update_forces(self, loads: Sequence[Load]) -> None:
+        """Computes the forces of constraints and joints for the present state.
+
+        After `settle` they are those of the exact equilibrium; MuJoCo's equality constraints, soft
+        as they are, would let go a little first.
+        """
+        if self._forces_known:
+            return
+        flags = self.model.opt.disableflags
+        if self.settled:
+            self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
+        self.forward([*loads, *self.settled.values()])
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+        self.model.opt.disableflags = flags
+        self.write_loads(loads)
+        self._forces_known = True
+
+    def reaction(self, held: Held) -> Reaction:
+        """What the world or an equality constraint does to the chain."""
+        if held.rigid:
+            return compute_root_reaction(self.data, held, int(self.bodies[0]))
+        body = self.point(held.hold.arc_length).body
+        return compute_equality_reaction(self.model, self.data, held, body)
+
+    def tension(self, arc_lengths: Array) -> Array:
+        """Axial force in the joints, straight lines between and beyond them."""
+        at_joints = self.motion().joint_tensions(self.data, self.bodies)
+        return self.layout.interpolate(arc_lengths, at_joints)
+
+    def torque(self, arc_lengths: Array) -> Array:
+        """Moment about the mean of the tangents on both sides of a joint, damping included."""
+        motion = self.motion()
+        wrenches = self.data.cfrc_int[self.bodies[1:]]
+        arms = self.data.subtree_com[self.bodies[0]] - motion.starts[1:]
+        on_rest = wrenches[:, :3] + np.cross(arms, wrenches[:, 3:])
+        tangents = motion.tangent(self.layout.nodes[1:-1])
+        return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
+
+    def energies(self) -> Energies:
+        """Energies at the present state; `stretching` is 0."""
+        gravity = self.model.opt.gravity
+        return self.motion().energies(self.mass, self.kind.stiffness, gravity)
+
+    def momentum(self) -> Momentum:
+        """Linear and angular momentum at the present state."""
+        return self.motion().momentum(self.mass)
+
+    def forget(self) -> None:
+        """Drops what was computed for an earlier state."""
+        super().forget()
+        self._motion = None
+
+    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
+        """Moves to static equilibrium, velocity zero."""
+        system = self._static_system(held, loads)
+        multipliers = solve_equilibrium(system)
+        self.write_targets(held)
+        self.data.qpos[:] = system.data.qpos
+        self.data.qvel[:], self.data.qacc_warmstart[:] = 0.0, 0.0
+        self.keep_settled(multipliers, held)
+
+    def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
+        """Small motions about the present pose."""
+        return linearize(self._static_system(held, loads))
+
+    # What acts on it, and steps.
+
+    def write_targets(self, held: Sequence[Held], lead: float = 0.0) -> None:
+        """Sets the poses of the bodies that equality constraints hold the hose to.
+
+        MuJoCo takes these bodies to be at rest, so a hold lags behind one that moves; `lead` steps
+        ahead of its target it is in time.
+        """
+        for item in held:
+            if not item.rigid:
+                place = self.model.body(f"target{item.hold.number}").mocapid[0]
+                self.data.mocap_pos[place], self.data.mocap_quat[place] = item.ahead(lead)
+
+    def write_loads(self, loads: Sequence[Load]) -> None:
+        """Sets the forces on the bodies, which act at their centres of mass, for this pose."""
+        self.data.xfrc_applied[:] = 0.0
+        if not loads:
+            return
+        mujoco.mj_kinematics(self.model, self.data)
+        for load in loads:
+            point = self.point(load.arc_length)
+            axes = self.data.xmat[point.body].reshape(3, 3)
+            arm = self.data.xpos[point.body] + axes @ point.local - self.data.xipos[point.body]
+            self.data.xfrc_applied[point.body, :3] += load.force
+            self.data.xfrc_applied[point.body, 3:] += load.moment + np.cross(arm, load.force)
+
+    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> ChainSystem:
+        """The equations of equilibrium from the present pose on."""
+        holds = [
+            StaticHold(
+                self.point(item.hold.arc_length),
+                item.position,
+                item.frame if item.hold.fixes_tangent else None,
+            )
+            for item in held
+            if not item.rigid
+        ]
+        forces = [StaticLoad(self.point(x.arc_length), x.force, x.moment) for x in loads]
+        chain = StaticChain(self.kind, self.model, self.bodies, self.rooted, self.layout)
+        motion = self.motion()
+        return ChainSystem(chain, motion.starts[0], motion.frames, holds, forces)
 
 
 class MujocoChainHose(MujocoHose):

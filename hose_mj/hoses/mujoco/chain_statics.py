@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hose_mj.hoses.mujoco.chain_kind import ChainKind
 from hose_mj.hoses.mujoco.chain_layout import (
+    ChainKind,
     ChainLayout,
     conjugate,
     exponential,

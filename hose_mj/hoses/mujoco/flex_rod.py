@@ -62,11 +62,11 @@ def make_rod(
     for k, (place, mass) in enumerate(zip(rest, masses, strict=True)):
         body = maker.worldbody.add_body(name=f"v{k}", pos=place)
         body.explicitinertial = True
-        body.mass, body.inertia = mass, [mass * spec.radius**2] * 3
+        body.mass, body.inertia = mass, [mass * spec.outer_radius**2] * 3
         for axis in np.eye(3):
             body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    rod = add_edges(maker, "hose", range(len(rest)), spec.radius)
-    rod.young = spec.bending_stiffness / (math.pi * spec.radius**4 / 4)
+    rod = add_edges(maker, "hose", range(len(rest)), spec.outer_radius)
+    rod.young = spec.bending_stiffness / (math.pi * spec.outer_radius**4 / 4)
     rod.poisson, rod.damping = 0.0, spec.damping_time
     maker.add_equality(
         name="edges",

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_choice
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_kind import ChainKind
 from hose_mj.hoses.mujoco.chain_layout import (
+    ChainKind,
     ChainLayout,
     conjugate,
     multiply,
@@ -129,7 +129,7 @@ class HingeJoints(ChainKind):
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_CAPSULE,
                 fromto=[0, 0, 0, h, 0, 0],
-                size=[self.spec.radius, 0, 0],
+                size=[self.spec.outer_radius, 0, 0],
                 contype=0,
                 conaffinity=0,
             )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.scenes.hose_file.toml_table import Table
+from hose_mj.toml_table import Table
 
 Vector = tuple[float, float, float]
 PROFILES = ("smooth", "linear")

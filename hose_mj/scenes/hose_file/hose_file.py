@@ -20,7 +20,7 @@ from hose_mj.scenes.hose_file.grasps import (
     read_place,
 )
 from hose_mj.scenes.hose_file.spec import read_spec
-from hose_mj.scenes.hose_file.toml_table import Table, read_toml
+from hose_mj.toml_table import Table, read_toml
 
 STARTS = ("equilibrium", "as-laid")
 GRAVITY: Vector = (0.0, 0.0, -9.81)
@@ -200,7 +200,7 @@ def _check_floor(own: OwnHose, file: Table) -> None:
     """Holds and the line of the user stay above the floor, by the hose's radius at least."""
     if own.floor is None:
         return
-    least = own.floor.height + own.spec.radius
+    least = own.floor.height + own.spec.outer_radius
     held = [hold.position for hold in own.holds]
     held += [move.to for hold in own.holds for move in hold.moves if move.to is not None]
     for key, places in (("holds", held), ("shape", own.shape or ())):

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import fields
-
 from hose_mj.errors import InputError
-from hose_mj.hoses.spec import Fitting, HoseSpec
-from hose_mj.scenes.hose_file.toml_table import Table
-from hose_mj.scenes.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_catalogue
+from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_catalogue
+from hose_mj.hoses.spec import Fitting, HoseSpec, complete_section
+from hose_mj.toml_table import Table
 
 LENGTHS = (1e-3, 1e4)
 """A hose is at least and at most so long (m)."""
 _MAY_BE_NEGATIVE = ("rest_strain", "rest_curvature", "rest_torsion")
-_MAY_BE_ZERO = ("poisson_ratio", "inner_diameter", "contents_density", "damping_time", "drag")
-_SPEC_KEYS = tuple(field.name for field in fields(HoseSpec) if field.name not in ("radius",))
+_MAY_BE_ZERO = (
+    *("poisson_ratio", "inner_diameter", "contents_density", "damping_time", "drag"),
+    "torsional_stiffness",
+)
 _FITTING_KEYS = ("axial_stiffness", "bending_stiffness", "torsional_stiffness", "linear_density")
-_ROUND = 1.3
-"""EI / GJ of a round section where nothing else is known: 1 + nu for nu = 0.3."""
+_NEEDED = (
+    ("axial_stiffness", "EA in N, or a material and outer_diameter"),
+    ("bending_stiffness", "EI in N m^2, or a material and outer_diameter"),
+    ("linear_density", "kg/m, or mass, or a material and outer_diameter"),
+    ("outer_radius", "m, or outer_diameter"),
+)
+"""What a hose must have in the end, and how a user gives it."""
 _SLENDER = 0.25
 """The radius is at most this fraction of the length."""
 
@@ -41,22 +45,15 @@ def read_spec(table: Table) -> HoseSpec:
         if "linear_density" in table:
             raise table.fail("mass", mass, "left out where linear_density is given")
         given["linear_density"] = mass / length
-    made = _make_from_section(table, given, length)
-    for key, why in (
-        ("axial_stiffness", "EA in N, or a material and outer_diameter"),
-        ("bending_stiffness", "EI in N m^2, or a material and outer_diameter"),
-        ("linear_density", "kg/m, or mass, or a material and outer_diameter"),
-        ("outer_radius", "m, or outer_diameter"),
-    ):
-        if key not in made:
-            raise table.fail(key, None, why)
-    made.setdefault("torsional_stiffness", made["bending_stiffness"] / _ROUND)
-    radius = made.pop("outer_radius")
-    if not radius <= _SLENDER * length:
-        valid = f"at most {_SLENDER:g} of the length, {_SLENDER * length:g} m"
-        raise table.fail("outer_radius", radius, valid)
     try:
-        return HoseSpec(length=length, radius=radius, fittings=fittings, **made)
+        made = complete_section(given)
+        for key, why in _NEEDED:
+            if key not in made:
+                raise InputError(key, None, why)
+        if not made["outer_radius"] <= _SLENDER * length:
+            valid = f"at most {_SLENDER:g} of the length, {_SLENDER * length:g} m"
+            raise InputError("outer_radius", made["outer_radius"], valid)
+        return HoseSpec(length=length, fittings=fittings, **made)
     except InputError as error:
         raise table.fail(error.thing, error.value, error.valid) from error
 
@@ -76,37 +73,6 @@ def _gather(table: Table) -> dict[str, float]:
         if value is not None:
             given[key] = value
     return given
-
-
-def _make_from_section(table: Table, given: dict[str, float], length: float) -> dict[str, float]:
-    """What diameters and a material make, then what was given; keys of `HoseSpec`, outer_radius."""
-    stated = {key: value for key, value in given.items() if key in (*_SPEC_KEYS, "outer_radius")}
-    if "outer_diameter" not in given:
-        return stated
-    outer, inner = given["outer_diameter"], given.get("inner_diameter", 0.0)
-    if inner >= outer:
-        raise table.fail("inner_diameter", inner, f"below outer_diameter, {outer:g} m")
-    made = {"outer_radius": outer / 2.0}
-    if {"youngs_modulus", "poisson_ratio", "density"} <= given.keys():
-        try:
-            tube = HoseSpec.from_material(
-                length=length,
-                youngs_modulus=given["youngs_modulus"],
-                poisson_ratio=given["poisson_ratio"],
-                density=given["density"],
-                outer_radius=outer / 2.0,
-                inner_radius=inner / 2.0,
-            )
-        except InputError as error:
-            raise table.fail(error.thing, error.value, error.valid) from error
-        contents = given.get("contents_density", 0.0) * math.pi * inner**2 / 4.0
-        made |= {
-            "axial_stiffness": tube.axial_stiffness,
-            "bending_stiffness": tube.bending_stiffness,
-            "torsional_stiffness": tube.torsional_stiffness,
-            "linear_density": tube.linear_density + contents,
-        }
-    return made | stated
 
 
 def _read_fitting(table: Table, length: float) -> Fitting:

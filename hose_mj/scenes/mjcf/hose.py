@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, read_catalogue
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.spec import LENGTHS, read_spec
-from hose_mj.scenes.hose_file.toml_table import LARGEST_NUMBER, Table
-from hose_mj.scenes.materials import HOSE_KEYS, MATERIAL_KEYS, read_catalogue
+from hose_mj.toml_table import LARGEST_NUMBER, Table
 
-_RADII = {"hose_radius": "outer_diameter", "hose_inner_radius": "inner_diameter"}
+_OUTER, _OLD_OUTER = "hose_outer_radius", "hose_radius"
+_RADII = {_OUTER: "outer_diameter", "hose_inner_radius": "inner_diameter"}
 _KEYS = tuple(
     key
     for key in dict.fromkeys((*MATERIAL_KEYS, *HOSE_KEYS))
@@ -20,10 +22,11 @@ _KEYS = tuple(
 _MAY_BE_NEGATIVE = ("hose_rest_strain", "hose_rest_curvature", "hose_rest_torsion")
 _MAY_BE_ZERO = (
     *("hose_poisson_ratio", "hose_inner_radius", "hose_contents_density"),
-    *("hose_damping_time", "hose_drag"),
+    *("hose_damping_time", "hose_drag", "hose_torsional_stiffness"),
 )
-HOSE_NUMERICS = ("hose_length", *_RADII, *(f"hose_{key}" for key in _KEYS))
-"""Names of the numerics that describe the hose itself, one number each, in SI units."""
+HOSE_NUMERICS = ("hose_length", *_RADII, *(f"hose_{key}" for key in _KEYS), _OLD_OUTER)
+"""Names of the numerics that describe the hose itself, one number each, in SI units; the last one
+is deprecated."""
 HOSE_TEXT = "hose_material"
 """Name of the text that names a material or a ready hose of materials.toml."""
 
@@ -44,12 +47,14 @@ def read_hose(
         InputError: a number out of range, too few of them, or an unknown material.
     """
     given = {name: _check(name, numerics[name], file) for name in HOSE_NUMERICS if name in numerics}
+    if _OLD_OUTER in given:
+        _warn_of_radius(given, file)
     if "hose_length" not in given:
         valid = f"<custom><numeric name='hose_length' data='...'/>, {_RANGE}"
         raise InputError(f"{file}: numeric hose_length", None, valid)
-    radius, inner = given.get("hose_radius"), given.get("hose_inner_radius")
+    radius, inner = given.get(_OUTER), given.get("hose_inner_radius")
     if inner is not None and radius is not None and inner >= radius:
-        valid = f"below hose_radius, {radius:g} m"
+        valid = f"below {_OUTER}, {radius:g} m"
         raise InputError(f"{file}: numeric hose_inner_radius", inner, valid)
     values: dict[str, object] = {"length": given["hose_length"]}
     values |= {key: given[f"hose_{key}"] for key in _KEYS if f"hose_{key}" in given}
@@ -59,6 +64,16 @@ def read_hose(
         return read_spec(Table(values, file))
     except InputError as error:
         raise _rename(error, given, file) from error
+
+
+def _warn_of_radius(given: dict[str, float], file: str) -> None:
+    """Takes the old name of the outer radius, for one release."""
+    if _OUTER in given:
+        valid = f"left out where {_OUTER} is given"
+        raise InputError(f"{file}: numeric {_OLD_OUTER}", given[_OLD_OUTER], valid)
+    text = f"{file}: numeric {_OLD_OUTER} is deprecated: write {_OUTER}"
+    warnings.warn(text, DeprecationWarning, stacklevel=2)
+    given[_OUTER] = given.pop(_OLD_OUTER)
 
 
 _RANGE = f"a number from {LENGTHS[0]:g} to {LENGTHS[1]:g} (m)"
@@ -98,7 +113,7 @@ def _find_material(texts: Mapping[str, str], file: str) -> dict[str, str]:
 def _rename(error: InputError, given: Mapping[str, float], file: str) -> InputError:
     """The same error in the words of a scene: numerics for TOML's keys, radii for diameters."""
     key = error.thing.rsplit(" ", 1)[-1].rsplit(".", 1)[-1]
-    names = {key: name for name, key in _RADII.items()} | {"outer_radius": "hose_radius"}
+    names = {key: name for name, key in _RADII.items()}
     name = names.get(key, f"hose_{key}")
-    valid = error.valid.replace("outer_diameter", "hose_radius")
+    valid = error.valid.replace("outer_diameter", _OUTER)
     return InputError(f"{file}: numeric {name}", given.get(name, error.value), valid)

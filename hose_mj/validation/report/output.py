@@ -64,7 +64,7 @@ def make_scene(result: CaseResult, within: float) -> Scene | None:
             np.linspace(0.0, case.spec.length, outcome.points.shape[1]),
             outcome.times,
             outcome.points,
-            case.spec.radius,
+            case.spec.outer_radius,
             COLORS[model],
         )
         for model, outcome in shown.items()

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from hose_mj.hoses.registry import MODELS, find_model
 from hose_mj.recording.plots import api as plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.report.obstacles import find_outlines
@@ -17,7 +18,7 @@ Pictures = dict[str, bytes]
 """PNG by file name without its suffix."""
 N_SNAPSHOTS = 6
 """Instants drawn into one picture of shapes."""
-PLANAR = ("hinge-chain",)
+PLANAR = tuple(model for model, entry in MODELS.items() if entry.is_planar)
 """Peers that move in a plane, and are held against GEDS in a plane."""
 PARAMETERS = {
     "heavy-cantilever": ("gamma-", "\u0393 = "),
@@ -82,7 +83,7 @@ def name_setting(outcome: Outcome) -> str:
 def describe_setting(outcome: Outcome) -> str:
     """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
     setting = outcome.setting
-    size = "control points" if setting.model == "geds" else "segments"
+    size = find_model(setting.model).resolution.replace("_", " ")
     step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
     return f"{setting.model}, {setting.resolution} {size}{step}"
 

@@ -101,8 +101,8 @@ def _check_above_floor(own: OwnHose) -> None:
     if own.floor is None:
         return
     lowest = float(np.min(make_line(own)(np.linspace(0.0, own.spec.length, 401))[:, 2]))
-    least = own.floor.height + own.spec.radius
-    if lowest < least - 0.01 * own.spec.radius:
+    least = own.floor.height + own.spec.outer_radius
+    if lowest < least - 0.01 * own.spec.outer_radius:
         valid = f"points along which the hose can be laid at or above z = {least:g} m"
         raise InputError("shape", f"down to z = {lowest:g} m", valid)
 
@@ -186,7 +186,7 @@ def describe(own: OwnHose) -> str:
     """A sentence on the hose and one on what happens to it."""
     spec = own.spec
     parts = [
-        f"{spec.length:g} m of hose, {2e3 * spec.radius:.3g} mm thick, {spec.mass:.3g} kg; "
+        f"{spec.length:g} m of hose, {2e3 * spec.outer_radius:.3g} mm thick, {spec.mass:.3g} kg; "
         f"EA = {spec.axial_stiffness:.3g} N, EI = {spec.bending_stiffness:.3g} N m\u00b2, "
         f"GJ = {spec.torsional_stiffness:.3g} N m\u00b2."
     ]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.registry import MODELS, make_hose
+from hose_mj.hoses.registry import find_model, make_hose
 from hose_mj.scenes.hose_file.hose_file import OwnHose
 from hose_mj.validation.user_hose.case import make_obstacles, starts_at_rest
 
@@ -37,7 +36,7 @@ def find_obstacle(own: OwnHose, model: str) -> InputError | None:
 
 def _find_floor_obstacle(own: OwnHose, model: str) -> str | None:
     """Why a model cannot lie on a floor here, or None."""
-    if "obstacles" not in inspect.signature(MODELS[model].load()).parameters:
+    if not find_model(model).contact:
         return f"{model} touches nothing"
     if model != "geds" and starts_at_rest(own):
         return f"only geds finds a rest shape on it; {model} runs with study.start = 'as-laid'"

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-import hose_mj
 from hose_learning.study.saving import (
     DESCRIPTION,
     compute_identity,
@@ -28,6 +27,7 @@ from hose_learning.study.training import Episodes, Training
 from hose_mj.errors import InputError
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.parquet import write_columns
+from hose_mj.version import __version__
 
 CONFIG, SUMMARY, CHECKPOINT = "config.json", "summary.json", "checkpoints/last.npz"
 
@@ -63,7 +63,7 @@ class RunFolder:
             "identity": compute_identity(description),
             "ends": dict(ends or {}),
             "versions": {
-                "hose_mj": hose_mj.__version__,
+                "hose_mj": __version__,
                 "numpy": np.__version__,
                 "python": platform.python_version(),
             },

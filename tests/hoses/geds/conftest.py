@@ -16,6 +16,7 @@ def make_hose():
             length=length,
             axial_stiffness=ea * ei / length**2,
             bending_stiffness=ei,
+            torsional_stiffness=0.0,
             linear_density=DENSITY,
             rest_curvature=curvature,
             damping_time=damping,

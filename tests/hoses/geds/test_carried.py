@@ -10,7 +10,7 @@ from hose_mj.hoses.geds.shapes import ROW
 
 SPEC = HoseSpec(
     length=1.0, axial_stiffness=1e3, bending_stiffness=0.02, torsional_stiffness=0.01,
-    linear_density=0.1, radius=0.01,
+    linear_density=0.1, outer_radius=0.01,
 )  # fmt: skip
 SCHEMES = ("backward-euler", "bdf2", "sdirk2", "midpoint")
 

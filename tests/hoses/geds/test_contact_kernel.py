@@ -12,7 +12,12 @@ from hose_mj.hoses.spec import HoseSpec
 N = 8
 STEP = 3e-3
 SPEC = HoseSpec(
-    length=1.0, axial_stiffness=1e3, bending_stiffness=0.05, linear_density=0.1, radius=0.05
+    length=1.0,
+    axial_stiffness=1e3,
+    bending_stiffness=0.05,
+    torsional_stiffness=0.0,
+    linear_density=0.1,
+    outer_radius=0.05,
 )
 OBSTACLES = {
     "plane": Obstacle(kind="plane", position=(0.0, 0.0, -0.03)),
@@ -59,7 +64,7 @@ def compute_energy(spline, contacts, x):
     distances, normals = np.zeros(len(points)), np.zeros_like(points)
     shapes.measure_points(contacts.contact.geoms, 0, points, distances, normals)
     k, width = contacts.law.stiffness, contacts.law.width
-    depth = np.maximum(width - (distances - SPEC.radius), 0.0)
+    depth = np.maximum(width - (distances - SPEC.outer_radius), 0.0)
     ramp = k * np.minimum(depth, 2 * width) ** 3 / (12 * width)
     beyond = np.maximum(depth - 2 * width, 0.0)
     energy = ramp + k * beyond * (width + beyond / 2)

@@ -53,6 +53,7 @@ def make_random(rng):
         length=1.0,
         axial_stiffness=ea,
         bending_stiffness=ei,
+        torsional_stiffness=0.0,
         linear_density=DENSITY,
         damping_time=float(damping),
     )
@@ -150,6 +151,7 @@ def test_snapshot_in_mid_motion_restores_bitwise(plane, scheme, moved):
         length=1.0,
         axial_stiffness=2e4,
         bending_stiffness=EI,
+        torsional_stiffness=0.0,
         linear_density=DENSITY,
         damping_time=0.01,
         drag=0.1,

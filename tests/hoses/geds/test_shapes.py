@@ -27,7 +27,13 @@ def make_obstacle(kind, rng):
 
 
 def make_row(obstacle):
-    spec = HoseSpec(length=1.0, axial_stiffness=1.0, bending_stiffness=1.0, linear_density=1.0)
+    spec = HoseSpec(
+        length=1.0,
+        axial_stiffness=1.0,
+        bending_stiffness=1.0,
+        torsional_stiffness=0.0,
+        linear_density=1.0,
+    )
     contacts = contact_set.ContactSet(Spline(5, 1.0, None), spec, np.zeros(3), 0.005)
     contacts.set([obstacle], ContactLaw())
     return contacts.contact.geoms

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.mujoco.flex_layout import FlexLayout, interpolate
-from hose_mj.hoses.mujoco.flex_motion import FlexMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion, interpolate
 from hose_mj.hoses.protocol import Hold
 from hose_mj.hoses.registry import make_hose
 from hose_mj.hoses.spec import Fitting, HoseSpec
@@ -23,6 +22,7 @@ def make(*, segments=20, timestep=1e-3, clamp_correction=True, gravity=(0, 0, -9
         "length": 1.0,
         "axial_stiffness": 1e5,
         "bending_stiffness": EI,
+        "torsional_stiffness": 0.0,
         "linear_density": DENSITY,
     }
     return make_hose(
@@ -291,7 +291,11 @@ def test_soft_edges_are_softer():
     stretches = []
     for options in ({}, {"edge_solref": (0.02, 1.0), "edge_solimp": (0.9, 0.95, 1e-3, 0.5, 2.0)}):
         spec = HoseSpec(
-            length=1.0, axial_stiffness=1e5, bending_stiffness=1e-3, linear_density=DENSITY
+            length=1.0,
+            axial_stiffness=1e5,
+            bending_stiffness=1e-3,
+            torsional_stiffness=0.0,
+            linear_density=DENSITY,
         )
         hose = make_hose("flex", spec, timestep=2e-3, segments=10, **options)
         hose.reset([[0, 0, 0], [0, 0, -1]])
@@ -430,6 +434,12 @@ def test_what_is_not_mapped_is_refused(spec):
     ],
 )
 def test_bad_settings(option, value):
-    spec = HoseSpec(length=1.0, axial_stiffness=1e5, bending_stiffness=EI, linear_density=DENSITY)
+    spec = HoseSpec(
+        length=1.0,
+        axial_stiffness=1e5,
+        bending_stiffness=EI,
+        torsional_stiffness=0.0,
+        linear_density=DENSITY,
+    )
     with pytest.raises(InputError, match=option):
         make_hose("flex", spec, timestep=1e-3, **{option: value})

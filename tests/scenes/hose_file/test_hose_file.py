@@ -15,7 +15,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.grasps import turn_towards
 from hose_mj.scenes.hose_file.hose_file import find_on_line, read_own_hose
-from hose_mj.scenes.hose_file.toml_table import LARGEST_FILE
+from hose_mj.toml_table import LARGEST_FILE
 
 EXAMPLES = sorted(find_assets().glob("hoses/*.toml"))
 HOSE = """

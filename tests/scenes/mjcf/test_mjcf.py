@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
+from hose_mj.scenes.mjcf import files as mjcf_files
+from hose_mj.scenes.mjcf import probe as mjcf_probe
 from hose_mj.scenes.mjcf.files import DEEPEST, LARGEST_XML, MOST_ELEMENTS, MOST_NAMED, read_files
 from hose_mj.scenes.mjcf.hose import HOSE_NUMERICS
-from hose_mj.scenes.mjcf.scene import files as mjcf_files
 from hose_mj.scenes.mjcf.scene import find_scene, read_scene
-from hose_mj.scenes.mjcf.scene import probe as mjcf_probe
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 HOSE = """
     <numeric name="hose_length" data="2"/>
-    <numeric name="hose_radius" data="0.01"/>
+    <numeric name="hose_outer_radius" data="0.01"/>
     <numeric name="hose_axial_stiffness" data="5e3"/>
     <numeric name="hose_bending_stiffness" data="5e-3"/>
     <numeric name="hose_linear_density" data="0.15"/>
@@ -82,7 +82,7 @@ def test_a_scene_is_read(write):
         bending_stiffness=5e-3,
         torsional_stiffness=5e-3 / 1.3,
         linear_density=0.15,
-        radius=0.01,
+        outer_radius=0.01,
     )
     assert (scene.friction, scene.timestep) == (0.3, 0.002)
     assert scene.bounds == ((-math.inf,) * 3, (math.inf,) * 3)
@@ -92,7 +92,8 @@ def test_a_scene_is_read(write):
 
 def test_a_section_and_a_material_make_the_hose(write):
     hose = """<numeric name="hose_length" data="2"/><text name="hose_material" data="steel"/>
-      <numeric name="hose_radius" data="0.01"/><numeric name="hose_inner_radius" data="0.005"/>"""
+      <numeric name="hose_outer_radius" data="0.01"/>
+      <numeric name="hose_inner_radius" data="0.005"/>"""
     tube = HoseSpec.from_material(
         length=2.0,
         youngs_modulus=210e9,
@@ -106,7 +107,7 @@ def test_a_section_and_a_material_make_the_hose(write):
     soft = read_scene(write(make_scene(softer))).spec
     assert soft.axial_stiffness == pytest.approx(1e-3 * tube.axial_stiffness)
     ready = hose.replace("steel", "usb-cable") + '<numeric name="hose_drag" data="0.1"/>'
-    cable = read_scene(write(make_scene(ready.split("<numeric name='hose_radius'")[0]))).spec
+    cable = read_scene(write(make_scene(ready.split("<numeric name='hose_outer_radius'")[0]))).spec
     assert (cable.bending_stiffness, cable.drag) == (2.64e-4, 0.1)
 
 
@@ -237,7 +238,10 @@ MISTAKES = [
     ),
     (replace_hose('data="2"', 'data="-2"'), "numeric hose_length is -2.0; valid: a number from"),
     (replace_hose('data="2"', 'data="1 2"'), "numeric hose_length is (1.0, 2.0); valid: one num"),
-    (replace_hose('data="0.01"', 'data="1"'), "numeric hose_radius is 1.0; valid: at most 0.25 "),
+    (
+        replace_hose('data="0.01"', 'data="1"'),
+        "numeric hose_outer_radius is 1.0; valid: at most 0.25 ",
+    ),
     (replace_hose('data="0.15"', 'data="0"'), "numeric hose_linear_density is 0.0; valid: a finit"),
     (replace_hose('data="5e3"', 'data="-1"'), "numeric hose_axial_stiffness is -1.0; valid: a f"),
     (make_scene(custom=number("hose_inner_radius", 0.01)), "hose_inner_radius is 0.01; valid: bel"),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hose_mj.assets import find_asset
 from hose_mj.errors import InputError
-from hose_mj.scenes.hose_file.toml_table import Table, read_toml
+from hose_mj.toml_table import Table, read_toml
 
 MATERIAL_KEYS = ("youngs_modulus", "poisson_ratio", "density", "damping_time")
 HOSE_KEYS = (

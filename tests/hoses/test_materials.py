@@ -9,7 +9,7 @@ import pytest
 
 from hose_mj.assets import find_asset
 from hose_mj.errors import InputError
-from hose_mj.scenes.materials import MATERIAL_KEYS, read_catalogue
+from hose_mj.hoses.materials import MATERIAL_KEYS, read_catalogue
 
 MATERIALS, HOSES = read_catalogue().materials, read_catalogue().hoses
 

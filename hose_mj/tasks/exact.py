@@ -85,13 +85,13 @@ def enumerate_joint(task: Task, starts: Iterable[Integers], limit: int = 10**6) 
     """
     joint_actions = np.array(list(product(range(task.n_actions), repeat=task.n_agents)), np.int64)
     rewards = np.zeros(len(task.rewards))
-    charged = np.zeros(task.n_agents, np.int64)
+    caused_events = np.zeros(task.n_agents, np.int64)
 
     def play(state: Integers, action: int) -> tuple[int, list[float]]:
-        events = kernels.apply_joint(task.kernel, state, joint_actions[action], charged)
+        events = kernels.apply_joint(task.kernel, state, joint_actions[action], caused_events)
         got = []
         for agent in range(task.n_agents):
-            kernels.compute_joint_rewards(task.kernel, charged, agent, rewards)
+            kernels.compute_joint_rewards(task.kernel, caused_events, agent, rewards)
             got.append(float(rewards.sum()))
         return events, got
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import Floats, Integers, Projection
+from hose_mj.tasks.kernels import HEADER, Floats, Integers, Projection
 from hose_mj.tasks.stream import Stream
 from hose_mj.tasks.variables import Variable, make_projection
 
@@ -89,6 +89,77 @@ class Task:
         return make_projection(self.variables, names)
 
 
+def compose_task(
+    record: Callable[..., Any],
+    *,
+    id: str,
+    agents: tuple[str, ...],
+    action_names: tuple[str, ...],
+    variables: tuple[Variable, ...],
+    events: tuple[str, ...],
+    rewards: Mapping[str, Mapping[str, float]],
+    settings: Any,
+    sizes: Mapping[str, int],
+    terminal: Collection[str],
+    violations: Collection[str],
+    success: Collection[str],
+    shared: Collection[str],
+    schedule: Schedule = "turns",
+    **rules: Any,
+) -> Task:
+    """Makes a task and its record, the fields that every record has from the names.
+
+    Args:
+        record: the type of the record, a NamedTuple.
+        id: its name in the registry.
+        agents: their names, in the order of their turns.
+        action_names: actions of each agent, by number.
+        variables: in the order in which `kernels.observe` writes them.
+        events: their names, bit 0 first.
+        rewards: for each signal, what each event is worth, see `make_reward_table`.
+        settings: see `Task`; the record has its `step_limit`.
+        sizes: lengths of the parts of the state after its header, in order.
+        terminal: the events that end an episode.
+        violations: the events that break a constraint.
+        success: the events that mean that the task is done.
+        shared: the events that every agent is rewarded for.
+        schedule: see `Task`.
+        rules: the record's own fields.
+    """
+
+    def pack(names: Collection[str]) -> int:
+        return sum(1 << bit for bit, name in enumerate(events) if name in names)
+
+    layout, end = {}, HEADER
+    for name, size in sizes.items():
+        layout[name] = slice(end, end + size)
+        end += size
+    kernel = record(
+        n_agents=len(agents),
+        n_actions=len(action_names),
+        step_limit=settings.step_limit,
+        terminal=pack(terminal),
+        violations=pack(violations),
+        success=pack(success),
+        shared=pack(shared),
+        reward_table=make_reward_table(events, rewards),
+        **rules,
+    )
+    return Task(
+        id=id,
+        agents=agents,
+        action_names=action_names,
+        variables=variables,
+        rewards=tuple(rewards),
+        events=events,
+        schedule=schedule,
+        settings=settings,
+        kernel=kernel,
+        layout=layout,
+        state_size=end,
+    )
+
+
 def make_reward_table(
     events: tuple[str, ...], rewards: Mapping[str, Mapping[str, float]]
 ) -> Floats:
@@ -99,6 +170,6 @@ def make_reward_table(
         rewards: for each signal, what an event is worth; an event that is not named is worth 0,
             and the reward of a set is the sum over its events.
     """
-    values = np.array([[worth.get(name, 0.0) for worth in rewards.values()] for name in events])
+    values = np.array([[signal.get(name, 0.0) for signal in rewards.values()] for name in events])
     sets = np.array([bits[::-1] for bits in product((0.0, 1.0), repeat=len(events))])
     return np.ascontiguousarray(sets @ values)

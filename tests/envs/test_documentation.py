@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hose_mj.envs.registration import IDS
+from hose_mj.envs import IDS
 from tools import task_pictures
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,8 +5,8 @@ import pytest
 import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference_tasks import line as twin
-from reference_tasks.line import LineTwin
+from reference_tasks import line as reference
+from reference_tasks.line import LineReference
 
 from hose_mj.tasks import kernels
 from hose_mj.tasks.line.geometry import (
@@ -45,7 +45,7 @@ def test_cells_that_a_segment_covers(end, cell, covered):
 @given(cells, cells, cells)
 def test_covering_is_that_of_exact_fractions_and_symmetric(a, b, cell):
     covered = covers(*a, *b, *cell)
-    assert covered == twin.covers(a, b, cell)
+    assert covered == reference.covers(a, b, cell)
     assert covered == covers(*b, *a, *cell)
     mirrored = [(-y, x) for x, y in (a, b, cell)]
     assert covered == covers(*mirrored[0], *mirrored[1], *mirrored[2])
@@ -54,10 +54,10 @@ def test_covering_is_that_of_exact_fractions_and_symmetric(a, b, cell):
 def test_a_cover_table_knows_all_cells_around_short_segments():
     table = make_cover_table(2)
     places = list(product(range(-4, 5), repeat=2))
-    ways = list(twin.STEPS.values())
+    ways = list(reference.STEPS.values())
     for row, end in enumerate(product(range(-2, 3), repeat=2)):
         for column, (x, y) in enumerate(places):
-            covered = [twin.covers((0, 0), end, (x + dx, y + dy)) for dx, dy in ways]
+            covered = [reference.covers((0, 0), end, (x + dx, y + dy)) for dx, dy in ways]
             assert table[row, column] == sum(1 << a for a, is_so in enumerate(covered) if is_so)
             assert not (max(abs(x), abs(y)) == 4 and any(covered))
 
@@ -172,7 +172,7 @@ def count_starts(task, n_samples):
 @pytest.mark.parametrize("id", ["line", "line-non-cooperative"])
 def test_initial_states_are_uniform_over_the_feasible_ones(id):
     task = make_task(id, n_robots=2, half_width=2, hose_length=3)
-    rules = LineTwin(task.settings)
+    rules = LineReference(task.settings)
     chains = []
     for robots in product(rules.offsets, repeat=2):
         last, step = robots

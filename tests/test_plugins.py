@@ -1,0 +1,86 @@
+"""Entry points of other packages: found without an import, loaded with one clear error."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from hose_mj.errors import InputError
+from hose_mj.plugins import find_plugins, load_plugin
+
+GROUP = "hose_mj.tests"
+
+
+def install(folder, package, text, **modules):
+    """Puts an installed package, as importlib.metadata sees it, into a folder on the path."""
+    information = folder / f"{package}-1.0.dist-info"
+    information.mkdir(parents=True)
+    (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text(f"[{GROUP}]\n{text}\n")
+    for name, source in modules.items():
+        (folder / f"{name}.py").write_text(source)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    before = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - before:
+        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
+            del sys.modules[name]
+
+
+def test_plugins_are_found_unimported_and_loaded(folder):
+    install(
+        folder,
+        "swarm",
+        "bee = swarm_one:BEE\nant = swarm_one:Ant",
+        swarm_one="BEE = 3\nclass Ant: ...",
+    )
+    found = find_plugins(GROUP)
+    assert list(found) == ["ant", "bee"]
+    assert "swarm_one" not in sys.modules
+    assert load_plugin(found["bee"]) == 3
+    assert load_plugin(found["ant"], type).__name__ == "Ant"
+
+
+def test_a_group_without_plugins_is_empty():
+    assert find_plugins("hose_mj.no_such_group") == {}
+
+
+def test_own_names_cannot_be_taken(folder):
+    install(folder, "swarm", "bee = swarm_two:BEE")
+    with pytest.raises(
+        InputError, match=r"'bee' in hose_mj.tests of package swarm .* own: bee, wasp"
+    ):
+        find_plugins(GROUP, own=["bee", "wasp"])
+
+
+def test_two_packages_cannot_take_one_name(folder):
+    install(folder, "hive", "bee = hive:BEE")
+    install(folder, "swarm", "bee = swarm:BEE")
+    with pytest.raises(InputError, match=r"no other package takes \((hive|swarm) has it\)"):
+        find_plugins(GROUP)
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("1 / 0", "ZeroDivisionError"),
+        ("", "has no attribute 'BEE'"),
+    ],
+)
+def test_a_broken_plugin_names_its_package(folder, source, message):
+    install(folder, "swarm", "bee = swarm_three:BEE", swarm_three=source)
+    with pytest.raises(InputError, match="package swarm") as caught:
+        load_plugin(find_plugins(GROUP)["bee"])
+    assert message in str(caught.value)
+
+
+def test_a_plugin_of_another_kind_is_refused(folder):
+    install(folder, "swarm", "bee = swarm_four:BEE", swarm_four="BEE = 3")
+    with pytest.raises(InputError, match="package swarm is 3; valid: a str or a type"):
+        load_plugin(find_plugins(GROUP)["bee"], (str, type))

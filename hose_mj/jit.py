@@ -14,7 +14,7 @@ import importlib.util
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -66,7 +66,10 @@ def _find_fingerprint(function: Callable[..., Any]) -> str:
 @cache
 def _find_places(package: str) -> tuple[Path, ...]:
     """The folders of a package, or the file of a module; none for what runs as a program."""
-    spec = None if package == "__main__" else importlib.util.find_spec(package)
+    try:
+        spec = None if package == "__main__" else importlib.util.find_spec(package)
+    except ValueError:  # a module without a spec
+        spec = None
     if spec is None:
         return ()
     return tuple(map(Path, spec.submodule_search_locations or filter(None, [spec.origin])))
@@ -81,14 +84,37 @@ def _find_record_packages(kind: Any) -> set[str]:
     return set()
 
 
-def _find_foreign_fingerprint(signature: Iterable[Any]) -> str:
-    """What a version of a function depends on in other packages, whose records its types name.
+class _CacheFiles:
+    """The files of a function's versions: those for records of other packages stand apart.
 
-    A loop of ours inlines the rules of a task or learner that another package registered.
+    A loop of ours inlines the rules of a task or learner that another package registered, so the
+    name of such a file has a fingerprint of that package. An index of its own, because whoever
+    reads an index imports the packages of all records in it, and this one may be gone.
     """
-    packages = set().union(*map(_find_record_packages, signature)) - {"hose_mj", "hose_learning"}
-    places = [place for package in sorted(packages) for place in _find_places(package)]
-    return "-".join(_read_fingerprint(place.resolve()) for place in places)
+
+    def __init__(self, place: str, name: str, stamp: Any) -> None:
+        self._place, self._name, self._stamp = place, name, stamp
+
+    def _open(self, signature: Any = ()) -> Any:
+        kinds = getattr(signature, "args", signature)
+        packages = set().union(*map(_find_record_packages, kinds)) - {"hose_mj", "hose_learning"}
+        name = self._name
+        for package in sorted(packages):
+            marks = [_read_fingerprint(place.resolve()) for place in _find_places(package)]
+            name += "." + "-".join([package, *marks])
+        return IndexDataCacheFile(self._place, name, self._stamp)  # type: ignore[no-untyped-call]
+
+    def load(self, key: tuple[Any, ...]) -> Any:
+        """Returns the compiled version for a key, which begins with the signature, or None."""
+        return self._open(key[0]).load(key)
+
+    def save(self, key: tuple[Any, ...], data: Any) -> None:
+        """Keeps a compiled version."""
+        self._open(key[0]).save(key, data)
+
+    def flush(self) -> None:
+        """Empties the index of our own records."""
+        self._open().flush()
 
 
 def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -106,12 +132,7 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
             name = f"{own.filename_base}.{_find_fingerprint(function)}"
             stamp = own.locator.get_source_stamp()
             place = made._cache._cache_path
-            made._cache._cache_file = IndexDataCacheFile(place, name, stamp)  # type: ignore[no-untyped-call]
-            number = made._cache._index_key
-            made._cache._index_key = lambda signature, codegen: (
-                *number(signature, codegen),
-                _find_foreign_fingerprint(signature),
-            )
+            made._cache._cache_file = _CacheFiles(place, name, stamp)
         return made
 
     return decorator

@@ -50,12 +50,12 @@ class Pair:
         return events
 
     def move_jointly(self, actions):
-        charged = np.full(self.task.n_agents, -1)
+        caused_events = np.full(self.task.n_agents, -1)
         actions = np.array(actions)
-        events = kernels.apply_joint(self.task.kernel, self.state, actions, charged)
+        events = kernels.apply_joint(self.task.kernel, self.state, actions, caused_events)
         by_reference = self.reference.move_jointly(actions.tolist())
-        assert charged.tolist() == [self.as_events(names) for names in by_reference]
-        assert events == np.bitwise_or.reduce(charged)
+        assert caused_events.tolist() == [self.as_events(names) for names in by_reference]
+        assert events == np.bitwise_or.reduce(caused_events)
         assert (self.state == self.reference.as_array()).all()
         return events
 

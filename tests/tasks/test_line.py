@@ -132,9 +132,9 @@ def test_events_of_single_moves(play):
 def test_a_swap(rule, expected, robots):
     task = make_task("line", n_robots=2, start=((0, 2), (0, 1)), goal="none", move_rule=rule)
     state = task.reset(np.array([1], np.uint64))
-    charged = np.zeros(2, np.int64)
-    kernels.apply_joint(task.kernel, state, np.array([DOWN, UP]), charged)
-    assert [set(task.name_events(events)) for events in charged] == expected
+    caused_events = np.zeros(2, np.int64)
+    kernels.apply_joint(task.kernel, state, np.array([DOWN, UP]), caused_events)
+    assert [set(task.name_events(events)) for events in caused_events] == expected
     assert state[task.layout["robots"]].tolist() == robots
 
 
@@ -142,9 +142,9 @@ def test_of_two_that_enter_one_cell_the_second_is_cancelled():
     start = ((0, 3), (1, 2))
     task = make_task("line-2015", n_robots=2, start=start, goal="random")
     state = task.reset(np.array([1], np.uint64))
-    charged = np.zeros(2, np.int64)
-    kernels.apply_joint(task.kernel, state, np.array([DOWN, LEFT]), charged)
-    assert [task.name_events(events) for events in charged] == [(), ("collision",)]
+    caused_events = np.zeros(2, np.int64)
+    kernels.apply_joint(task.kernel, state, np.array([DOWN, LEFT]), caused_events)
+    assert [task.name_events(events) for events in caused_events] == [(), ("collision",)]
     assert state[task.layout["robots"]].tolist() == [0, 2, 1, 2]
 
 
@@ -196,9 +196,12 @@ def test_terminal_states_have_values_within_range():
     start = ((3, 0), (1, 0))
     task = make_task("line", n_robots=2, hose_length=4, half_width=3, start=start, goal="none")
     state = task.reset(np.array([1], np.uint64))
-    charged = np.zeros(2, np.int64)
-    kernels.apply_joint(task.kernel, state, np.array([RIGHT, LEFT]), charged)
-    assert [task.name_events(events) for events in charged] == [("out", "stretch"), ("stretch",)]
+    caused_events = np.zeros(2, np.int64)
+    kernels.apply_joint(task.kernel, state, np.array([RIGHT, LEFT]), caused_events)
+    assert [task.name_events(events) for events in caused_events] == [
+        ("out", "stretch"),
+        ("stretch",),
+    ]
     names = [variable.name for variable in task.variables]
     values = dict(zip(names, task.observe(state, 0), strict=True))
     assert values["p"] == 6 * 7 + 3  # (3, 0), the nearest cell of the grid

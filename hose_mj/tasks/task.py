@@ -43,11 +43,11 @@ class Task:
     variables: tuple[Variable, ...]
     rewards: tuple[str, ...]
     events: tuple[str, ...]
-    schedule: Schedule
     settings: Any
     kernel: Any
     layout: Mapping[str, slice]
     state_size: int
+    schedule: Schedule = "turns"
 
     @property
     def n_agents(self) -> int:
@@ -92,72 +92,40 @@ class Task:
 def compose_task(
     record: Callable[..., Any],
     *,
-    id: str,
-    agents: tuple[str, ...],
-    action_names: tuple[str, ...],
-    variables: tuple[Variable, ...],
-    events: tuple[str, ...],
     rewards: Mapping[str, Mapping[str, float]],
-    settings: Any,
     sizes: Mapping[str, int],
     terminal: Collection[str],
     violations: Collection[str],
     success: Collection[str],
     shared: Collection[str],
-    schedule: Schedule = "turns",
-    **rules: Any,
+    **names: Any,
 ) -> Task:
-    """Makes a task and its record, the fields that every record has from the names.
+    """Makes a task and its record, the fields that every record has from names.
 
     Args:
-        record: the type of the record, a NamedTuple.
-        id: its name in the registry.
-        agents: their names, in the order of their turns.
-        action_names: actions of each agent, by number.
-        variables: in the order in which `kernels.observe` writes them.
-        events: their names, bit 0 first.
+        record: the NamedTuple with its own fields given (`functools.partial`).
         rewards: for each signal, what each event is worth, see `make_reward_table`.
-        settings: see `Task`; the record has its `step_limit`.
         sizes: lengths of the parts of the state after its header, in order.
         terminal: the events that end an episode.
         violations: the events that break a constraint.
         success: the events that mean that the task is done.
         shared: the events that every agent is rewarded for.
-        schedule: see `Task`.
-        rules: the record's own fields.
+        names: the other fields of the `Task`; its settings have a `step_limit`.
     """
-
-    def pack(names: Collection[str]) -> int:
-        return sum(1 << bit for bit, name in enumerate(events) if name in names)
-
+    events = names["events"]
     layout, end = {}, HEADER
     for name, size in sizes.items():
         layout[name] = slice(end, end + size)
         end += size
+    sets = {"terminal": terminal, "violations": violations, "success": success, "shared": shared}
     kernel = record(
-        n_agents=len(agents),
-        n_actions=len(action_names),
-        step_limit=settings.step_limit,
-        terminal=pack(terminal),
-        violations=pack(violations),
-        success=pack(success),
-        shared=pack(shared),
+        n_agents=len(names["agents"]),
+        n_actions=len(names["action_names"]),
+        step_limit=names["settings"].step_limit,
         reward_table=make_reward_table(events, rewards),
-        **rules,
+        **{kind: sum(1 << events.index(name) for name in chosen) for kind, chosen in sets.items()},
     )
-    return Task(
-        id=id,
-        agents=agents,
-        action_names=action_names,
-        variables=variables,
-        rewards=tuple(rewards),
-        events=events,
-        schedule=schedule,
-        settings=settings,
-        kernel=kernel,
-        layout=layout,
-        state_size=end,
-    )
+    return Task(rewards=tuple(rewards), kernel=kernel, layout=layout, state_size=end, **names)
 
 
 def make_reward_table(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any, Literal, cast
 
@@ -126,7 +127,21 @@ def make_line(settings: LineSettings) -> Task:
     success = ("all_goals",) if settings.own_goals else ("goal",)
     tables = _make_tables(settings)
     task = compose_task(
-        rules.Line,
+        partial(
+            rules.Line,
+            n_robots=n,
+            single_agent=settings.single_agent,
+            own_goals=settings.own_goals,
+            cancelling=settings.move_rule == "cancelling",
+            collision=COLLISIONS[settings.collision],
+            half_width=settings.half_width,
+            random_start=settings.start == "random",
+            starts=_read_cells(settings.start, n),
+            goal_mode=GOAL_MODES.get(str(settings.goal), rules.FIXED),
+            goals=_read_cells(settings.goal, n_goals),
+            goal_cells=_list_goal_cells(settings),
+            **tables,
+        ),
         id="line",
         agents=agents,
         action_names=actions,
@@ -143,18 +158,6 @@ def make_line(settings: LineSettings) -> Task:
         violations=VIOLATIONS,
         success=success,
         shared=success,
-        n_robots=n,
-        single_agent=settings.single_agent,
-        own_goals=settings.own_goals,
-        cancelling=settings.move_rule == "cancelling",
-        collision=COLLISIONS[settings.collision],
-        half_width=settings.half_width,
-        random_start=settings.start == "random",
-        starts=_read_cells(settings.start, n),
-        goal_mode=GOAL_MODES.get(str(settings.goal), rules.FIXED),
-        goals=_read_cells(settings.goal, n_goals),
-        goal_cells=_list_goal_cells(settings),
-        **tables,
     )
     _check_cells_fit(task)
     return task

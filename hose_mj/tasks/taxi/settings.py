@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -81,7 +82,17 @@ def make_taxi(settings: TaxiSettings) -> Task:
         actions = tuple("+".join(f"{name}_{k}" for k, name in enumerate(c)) for c in choices)
     places = {name: rules.WIDTH * row + column for name, (row, column) in STATIONS.items()}
     return compose_task(
-        rules.Taxi,
+        partial(
+            rules.Taxi,
+            n_taxis=n,
+            single_agent=single,
+            walls=_make_walls(),
+            starts=np.array(
+                [rules.WIDTH * row + column for row, column in settings.starts], np.int64
+            ),
+            origins=np.array([places[a] for a, _ in settings.passengers], np.int64),
+            destinations=np.array([places[b] for _, b in settings.passengers], np.int64),
+        ),
         id="taxi",
         agents=("taxis",) if single else tuple(f"taxi_{taxi}" for taxi in range(n)),
         action_names=actions,
@@ -102,12 +113,6 @@ def make_taxi(settings: TaxiSettings) -> Task:
         violations=collisions,
         success=("goal",),
         shared=("goal",),
-        n_taxis=n,
-        single_agent=single,
-        walls=_make_walls(),
-        starts=np.array([rules.WIDTH * row + column for row, column in settings.starts], np.int64),
-        origins=np.array([places[a] for a, _ in settings.passengers], np.int64),
-        destinations=np.array([places[b] for _, b in settings.passengers], np.int64),
     )
 
 

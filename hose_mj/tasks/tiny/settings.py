@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -62,7 +63,14 @@ class CorridorSettings:
 def make_corridor(settings: CorridorSettings) -> Task:
     """Makes the corridor."""
     return compose_task(
-        Corridor,
+        partial(
+            Corridor,
+            n_cells=settings.n_cells,
+            goal=settings.goal,
+            starts=np.array(settings.starts, np.int64),
+            goal_ends_move=settings.goal_ends == "move",
+            winner=WINNERS[settings.winner],
+        ),
         id="corridor",
         agents=("robot_0", "robot_1"),
         action_names=("left", "right", "none"),
@@ -77,11 +85,6 @@ def make_corridor(settings: CorridorSettings) -> Task:
         violations=("collision",),
         success=("done",),
         shared=("collision", "goal", "done"),
-        n_cells=settings.n_cells,
-        goal=settings.goal,
-        starts=np.array(settings.starts, np.int64),
-        goal_ends_move=settings.goal_ends == "move",
-        winner=WINNERS[settings.winner],
     )
 
 
@@ -137,7 +140,16 @@ def make_maze(settings: MazeSettings) -> Task:
     width, height = MAZE_SHAPE
     start = (-1, -1) if settings.start == "random" else settings.start
     return compose_task(
-        Maze,
+        partial(
+            Maze,
+            width=width,
+            height=height,
+            goal_x=settings.goal[0],
+            goal_y=settings.goal[1],
+            start_x=start[0],
+            start_y=start[1],
+            walls=_make_walls(),
+        ),
         id="maze",
         agents=("robot_0",),
         action_names=actions,
@@ -155,13 +167,6 @@ def make_maze(settings: MazeSettings) -> Task:
         violations=("collision",),
         success=("goal",),
         shared=(),
-        width=width,
-        height=height,
-        goal_x=settings.goal[0],
-        goal_y=settings.goal[1],
-        start_x=start[0],
-        start_y=start[1],
-        walls=_make_walls(),
     )
 
 

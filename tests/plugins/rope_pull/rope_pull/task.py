@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.task import Task, compose_task
@@ -25,7 +26,7 @@ class RopeSettings:
 def make_rope_pull(settings: RopeSettings) -> Task:
     """Makes the task."""
     return compose_task(
-        Rope,
+        partial(Rope, n_cells=settings.n_cells),
         id="rope-pull",
         agents=("left", "right"),
         action_names=("loose", "none", "pull"),
@@ -38,5 +39,4 @@ def make_rope_pull(settings: RopeSettings) -> Task:
         violations=("off",),
         success=("goal",),
         shared=("goal",),
-        n_cells=settings.n_cells,
     )

@@ -90,7 +90,7 @@ class Renderer:
             InputError: nothing to show yet.
         """
         if self.mode is not None and not episode.begun:
-            raise InputError("episode", "not begun", "one that runs; call reset() first")
+            raise InputError.about("cannot show an episode that has not begun: call reset() first")
         if self.mode == "ansi":
             return self._write(episode)
         if self.mode == "rgb_array":
@@ -207,8 +207,8 @@ def draw_maze(record: Maze, task: Task, state: Integers, caption: str) -> Pictur
         record.width,
         record.height,
         (goal, *number_robots(at[None])),
-        walls=tuple(find_side(x, y, *step) for x, y, step in sides),
-        flags=find_flags(task, state, [(float(at[0]), float(at[1]))]),
+        walls=tuple(compute_side(x, y, *step) for x, y, step in sides),
+        flags=list_flags(task, state, [(float(at[0]), float(at[1]))]),
         caption=caption,
     )
 
@@ -238,7 +238,7 @@ def draw_line(record: Line, task: Task, state: Integers, caption: str) -> Pictur
         side,
         (*marks, *number_robots(points)),
         hose=tuple(corners),
-        flags=find_flags(task, state, corners[:-1]),
+        flags=list_flags(task, state, corners[:-1]),
         caption=caption,
     )
 
@@ -247,21 +247,21 @@ def draw_line(record: Line, task: Task, state: Integers, caption: str) -> Pictur
 def draw_taxi(record: Taxi, task: Task, state: Integers, caption: str) -> Picture:
     """Dietterich's map; a passenger has the colour of the station that he wants to go to."""
     stations = {
-        _find_taxi_cell(WIDTH * row + column): name for name, (row, column) in STATIONS.items()
+        _place_taxi_cell(WIDTH * row + column): name for name, (row, column) in STATIONS.items()
     }
     marks = [Mark(STATION, at, name, STATION_COLORS[name]) for at, name in stations.items()]
-    taxis = [_find_taxi_cell(cell) for cell in state[task.layout["taxis"]]]
+    taxis = [_place_taxi_cell(cell) for cell in state[task.layout["taxis"]]]
     for number, at in enumerate(taxis):
         marks.append(Mark(TAXI, at, str(number), AGENT_COLORS[number]))
     for number, status in enumerate(state[task.layout["passengers"]]):
-        origin = _find_taxi_cell(record.origins[number])
-        destination = _find_taxi_cell(record.destinations[number])
+        origin = _place_taxi_cell(record.origins[number])
+        destination = _place_taxi_cell(record.destinations[number])
         x, y = (origin, *taxis, destination)[status]
         aside = 0.0 if 0 < status <= len(taxis) else 0.28 * number - 0.1
         color = STATION_COLORS[stations[destination]]
         marks.append(Mark(PASSENGER, (x + aside, y - 0.2), str(number), color))
     walls = [
-        find_side(*_find_taxi_cell(cell), *_STEPS[way])
+        compute_side(*_place_taxi_cell(cell), *_STEPS[way])
         for cell in range(WIDTH**2)
         for way, wall in zip(("up", "right", "down", "left"), record.walls[cell], strict=True)
         if wall
@@ -272,23 +272,23 @@ def draw_taxi(record: Taxi, task: Task, state: Integers, caption: str) -> Pictur
         WIDTH,
         tuple(marks),
         walls=tuple(walls),
-        flags=find_flags(task, state, taxis),
+        flags=list_flags(task, state, taxis),
         caption=caption,
     )
 
 
-def _find_taxi_cell(number: int) -> Point:
+def _place_taxi_cell(number: int) -> Point:
     """Returns column and row, counted upwards, of a cell of the taxi's map."""
     return float(number % WIDTH), float(WIDTH - 1 - number // WIDTH)
 
 
-def find_side(x: float, y: float, dx: float, dy: float) -> tuple[Point, Point]:
+def compute_side(x: float, y: float, dx: float, dy: float) -> tuple[Point, Point]:
     """Returns the ends of a cell's side in a direction."""
     middle, half = (x + dx / 2, y + dy / 2), (abs(dy) / 2, abs(dx) / 2)
     return (middle[0] - half[0], middle[1] - half[1]), (middle[0] + half[0], middle[1] + half[1])
 
 
-def find_flags(task: Task, state: Integers, cells: list[Point]) -> tuple[tuple[Point, Point], ...]:
+def list_flags(task: Task, state: Integers, cells: list[Point]) -> tuple[tuple[Point, Point], ...]:
     """Returns the sides of the robots' cells whose flag is 1.
 
     A flag is called o_up for the agent that sees it, o_up_2 for robot 2 of a single agent.

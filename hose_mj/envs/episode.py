@@ -129,8 +129,8 @@ class Episode:
 
     def _check_running(self) -> None:
         if not self.is_running:
-            found = "over" if self.begun else "not begun"
-            raise InputError("episode", found, "one that runs; call reset() first")
+            found = "is over" if self.begun else "has not begun"
+            raise InputError.about(f"cannot step an episode that {found}: call reset() first")
 
     def _play(self, play: Callable[..., Any], actions: int | Integers) -> None:
         record = self.task.kernel

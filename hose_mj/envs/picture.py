@@ -87,7 +87,7 @@ def write_picture(picture: Picture) -> str:
         for point in _walk(start, end):
             cells[point] = "*"
     for mark in picture.marks:
-        cell = _find_cell(mark.at)
+        cell = _round_to_cell(mark.at)
         before = cells.get(cell, "")
         letter = _LETTERS[mark.kind] + mark.label
         cells[cell] = before[:1] + letter[:1] if mark.kind == PASSENGER else letter
@@ -122,7 +122,7 @@ def _has_wall(picture: Picture, middle: Point) -> bool:
     )
 
 
-def _find_cell(point: Point) -> tuple[int, int]:
+def _round_to_cell(point: Point) -> tuple[int, int]:
     return floor(point[0] + 0.5), floor(point[1] + 0.5)
 
 
@@ -130,7 +130,7 @@ def _walk(start: Point, end: Point) -> list[tuple[int, int]]:
     """Cells along a segment, sampled four times a cell."""
     steps = max(1, ceil(4 * dist(start, end)))
     shares = [k / steps for k in range(steps + 1)]
-    return [_find_cell(tuple(a + t * (b - a) for a, b in zip(start, end))) for t in shares]  # type: ignore[arg-type]  # noqa: B905
+    return [_round_to_cell(tuple(a + t * (b - a) for a, b in zip(start, end))) for t in shares]  # type: ignore[arg-type]  # noqa: B905
 
 
 # As an image: drawn twice as large with Pillow, loaded at the first one, and then averaged

@@ -134,7 +134,7 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
             InputError: actions of another shape or out of range, or no reset before.
         """
         if not self._begun:
-            raise InputError("episode", "not begun", "one that runs; call reset() first")
+            raise InputError.about("cannot step an episode that has not begun: call reset() first")
         self._play(self._check_actions(actions))
         batch = self._batch
         rewards = sum_signals(compute_team_signals(batch.reward_by_mover), self._chosen)

@@ -79,7 +79,7 @@ def _find_record_packages(kind: Any) -> set[str]:
     """The packages of the records in a type, at any depth."""
     if isinstance(kind, types.BaseTuple):
         record = getattr(kind, "instance_class", None)
-        inner = [_find_record_packages(part) for part in kind]
+        inner = [_find_record_packages(part) for part in getattr(kind, "types", ())]
         return set().union(*inner) | ({record.__module__.partition(".")[0]} if record else set())
     return set()
 

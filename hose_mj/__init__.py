@@ -11,6 +11,7 @@ Importing the package costs next to nothing; what it exports is loaded at first 
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 from hose_mj.version import __version__
@@ -78,3 +79,11 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES})
+
+
+if "gymnasium" in sys.modules:
+    # As Gymnasium's users expect; `gymnasium.make("hose_mj:hose_mj/Line-v0")` comes here too.
+    from hose_mj.extras import is_installed
+
+    if is_installed("rl"):
+        import hose_mj.envs  # noqa: F401  (registers the ids)

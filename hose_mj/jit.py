@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba import types
 from numba.core.caching import IndexDataCacheFile
 from numba.extending import overload, register_jitable
 
@@ -39,7 +40,8 @@ def _read_fingerprint(package: Path) -> str:
 
     Records and constants are often defined in files without kernels.
     """
-    sources = {file: file.read_bytes() for file in package.rglob("*.py")}
+    files = package.rglob("*.py") if package.is_dir() else [package]
+    sources = {file: file.read_bytes() for file in files}
     chosen = {file for file, text in sources.items() if b"hose_mj.jit import" in text}
     imported = (re.findall(rb"^from ([\w.]+) import", sources[file], re.M) for file in chosen)
     for module in {module.decode() for modules in imported for module in modules}:
@@ -57,9 +59,62 @@ def _find_fingerprint(function: Callable[..., Any]) -> str:
     top = function.__module__.partition(".")[0]
     places = [_PACKAGE]
     for name in ("hose_learning", top) if top != "hose_mj" else ():
-        spec = None if name == "__main__" else importlib.util.find_spec(name)
-        places += [Path(place) for place in (spec and spec.submodule_search_locations) or ()]
+        places += _find_places(name)
     return "-".join(_read_fingerprint(place.resolve()) for place in dict.fromkeys(places))
+
+
+@cache
+def _find_places(package: str) -> tuple[Path, ...]:
+    """The folders of a package, or the file of a module; none for what runs as a program."""
+    try:
+        spec = None if package == "__main__" else importlib.util.find_spec(package)
+    except ValueError:  # a module without a spec
+        spec = None
+    if spec is None:
+        return ()
+    return tuple(map(Path, spec.submodule_search_locations or filter(None, [spec.origin])))
+
+
+def _find_record_packages(kind: Any) -> set[str]:
+    """The packages of the records in a type, at any depth."""
+    if isinstance(kind, types.BaseTuple):
+        record = getattr(kind, "instance_class", None)
+        inner = [_find_record_packages(part) for part in getattr(kind, "types", ())]
+        return set().union(*inner) | ({record.__module__.partition(".")[0]} if record else set())
+    return set()
+
+
+class _CacheFiles:
+    """The files of a function's versions: those for records of other packages stand apart.
+
+    A loop of ours inlines the rules of a task or learner that another package registered, so the
+    name of such a file has a fingerprint of that package. An index of its own, because whoever
+    reads an index imports the packages of all records in it, and this one may be gone.
+    """
+
+    def __init__(self, place: str, name: str, stamp: Any) -> None:
+        self._place, self._name, self._stamp = place, name, stamp
+
+    def _open(self, signature: Any = ()) -> Any:
+        kinds = getattr(signature, "args", signature)
+        packages = set().union(*map(_find_record_packages, kinds)) - {"hose_mj", "hose_learning"}
+        name = self._name
+        for package in sorted(packages):
+            marks = [_read_fingerprint(place.resolve()) for place in _find_places(package)]
+            name += "." + "-".join([package, *marks])
+        return IndexDataCacheFile(self._place, name, self._stamp)  # type: ignore[no-untyped-call]
+
+    def load(self, key: tuple[Any, ...]) -> Any:
+        """Returns the compiled version for a key, which begins with the signature, or None."""
+        return self._open(key[0]).load(key)
+
+    def save(self, key: tuple[Any, ...], data: Any) -> None:
+        """Keeps a compiled version."""
+        self._open(key[0]).save(key, data)
+
+    def flush(self) -> None:
+        """Empties the index of our own records."""
+        self._open().flush()
 
 
 def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -77,7 +132,7 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
             name = f"{own.filename_base}.{_find_fingerprint(function)}"
             stamp = own.locator.get_source_stamp()
             place = made._cache._cache_path
-            made._cache._cache_file = IndexDataCacheFile(place, name, stamp)  # type: ignore[no-untyped-call]
+            made._cache._cache_file = _CacheFiles(place, name, stamp)
         return made
 
     return decorator
@@ -88,13 +143,17 @@ compiled = _decorate()
 bitwise = _decorate(fastmath=False, _nrt=False)
 # _nrt=False (no allocation inside) is left out of numba's types.
 kernel = _decorate(_nrt=False)
+# Over all cores, with the arithmetic of its source; what it calls has its own options.
+parallel = _decorate(fastmath=False, parallel=True)
 # For small functions of a record with many fields, which a call would have to copy one by one.
 inlined = _decorate(_nrt=False, forceinline=True)
 # Put into its callers before they are compiled: no code of its own, which each caller of a long
 # function would optimize once more.
 merged = _decorate(inline="always")
 # Compiled into compiled callers; for others it stays plain Python, whatever its arguments are.
-jitable: Any = register_jitable(forceinline=True, error_model="numpy")
+jitable: Callable[[Callable[..., Any]], Any] = register_jitable(
+    forceinline=True, error_model="numpy"
+)
 
 
 def choose_by_unknowns(choices: Mapping[int, Any]) -> Any:

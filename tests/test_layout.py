@@ -25,7 +25,7 @@ _CONSTRAINTS = _WORLD | {"hose_mj.world"}
 FLOORS = {
     # What it exports it imports at first use, under TYPE_CHECKING else: nothing stands on it.
     "hose_mj": _CONSTRAINTS
-    | {"hose_mj.constraints", "hose_mj.tasks", "hose_mj.envs", "hose_mj.moved"},
+    | {"hose_mj.constraints", "hose_mj.tasks", "hose_mj.envs", "hose_mj.moved", "hose_mj.version"},
     "hose_mj.moved": set(),
     "hose_mj.version": set(),
     "hose_mj.errors": set(),

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from hose_mj.envs.pictures import make_picture
-from hose_mj.envs.raster import draw_picture
+from hose_mj.envs.drawing import make_picture
+from hose_mj.envs.picture import draw_picture
 from hose_mj.recording.files import write_atomically
 from hose_mj.tasks import kernels
 from hose_mj.tasks.registry import make_task

@@ -14,7 +14,7 @@ from hose_learning.study.run_folder import RunFolder
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import STEPS, TURN
-from hose_mj.tasks.line.settings import LineSettings
+from hose_mj.tasks.line.kernels import Line
 from hose_mj.tasks.stream import make_stream
 from hose_mj.world.actions import Actions, find_cells
 from hose_mj.world.driving import Driver
@@ -40,7 +40,7 @@ class SavedLearner:
         self._path = path
         self._training, _ = RunFolder(path).open()
         task = self._training.task
-        if not isinstance(task.settings, LineSettings) or task.settings.own_goals:
+        if not isinstance(task.kernel, Line) or task.kernel.own_goals:
             raise InputError("task of the run", task.id, "line, with one goal")
         if self._training.entry.schedule == "joint":
             valid = "one whose agents move in turns"

@@ -27,8 +27,8 @@ class Episode:
 
     Attributes:
         state: of the task, see `hose_mj.tasks.kernels`.
-        charged: the events that each agent caused in the last step (n_agents,).
-        felt: what each agent got for each mover's events, by signal
+        caused_events: the events that each agent caused in the last step (n_agents,).
+        reward_by_mover: what each agent got for each mover's events, by signal
             (movers, agents, n_signals).
         events: all events of the last step, as bits.
         terminated: an event has ended the episode.
@@ -43,8 +43,8 @@ class Episode:
         n_agents, n_signals = task.n_agents, len(task.rewards)
         self.task = task
         self.state = task.make_state()
-        self.charged = np.zeros(n_agents, np.int64)
-        self.felt = np.zeros((n_agents, n_agents, n_signals))
+        self.caused_events = np.zeros(n_agents, np.int64)
+        self.reward_by_mover = np.zeros((n_agents, n_agents, n_signals))
         self.events = 0
         self.terminated = self.truncated = False
         self.chosen = choose_signals(task, rewards)
@@ -72,7 +72,7 @@ class Episode:
         if generator is not self._generator or self._stream is None:
             self._generator, self._stream = generator, make_stream(generator)
         self.state = self.task.reset(self._stream)
-        kernels.forget(self.charged, self.felt)
+        kernels.forget(self.caused_events, self.reward_by_mover)
         self.events, self.begun = 0, True
         self.terminated = self.truncated = False
 
@@ -84,7 +84,7 @@ class Episode:
         """
         self._check_running()
         number = self.check_action(action, self.turn)
-        kernels.forget(self.charged, self.felt)
+        kernels.forget(self.caused_events, self.reward_by_mover)
         self._play(kernels.play_turn, number)
 
     def play_all(self, actions: Sequence[Any], at_once: bool) -> None:
@@ -121,35 +121,35 @@ class Episode:
 
     def compute_agent_rewards(self) -> Floats:
         """Returns the agents' rewards of the last step (n_agents,), the chosen signals summed."""
-        return sum_signals(self.felt.sum(axis=0), self.chosen)
+        return sum_signals(self.reward_by_mover.sum(axis=0), self.chosen)
 
     def compute_team_signals(self) -> Floats:
         """Returns the team's rewards of the last step, by signal; see `compute_team_signals`."""
-        return compute_team_signals(self.felt)
+        return compute_team_signals(self.reward_by_mover)
 
     def _check_running(self) -> None:
         if not self.is_running:
-            found = "over" if self.begun else "not begun"
-            raise InputError("episode", found, "one that runs; call reset() first")
+            found = "is over" if self.begun else "has not begun"
+            raise InputError.about(f"cannot step an episode that {found}: call reset() first")
 
     def _play(self, play: Callable[..., Any], actions: int | Integers) -> None:
         record = self.task.kernel
         play = kernels.choose(play, record)
         with nullcontext() if self._compiled else compile_notice(f"task {self.task.id}"):
-            events = play(record, self.state, actions, self.charged, self.felt)
+            events = play(record, self.state, actions, self.caused_events, self.reward_by_mover)
         self._compiled = True
         self.events = int(events)
         self.terminated = bool(self.events & self.task.kernel.terminal)
         self.truncated = not self.terminated and self.steps >= self.task.step_limit
 
 
-def compute_team_signals(felt: Floats) -> Floats:
+def compute_team_signals(reward_by_mover: Floats) -> Floats:
     """Returns what a team gets, by signal (..., n_signals): each mover's own rewards, summed.
 
-    So an event that all agents feel counts once, as in Table 6.1. `felt` is
+    So an event that all agents feel counts once, as in Table 6.1. `reward_by_mover` is
     (..., movers, agents, n_signals).
     """
-    own: Floats = np.einsum("...mms->...s", felt)
+    own: Floats = np.einsum("...mms->...s", reward_by_mover)
     return own
 
 
@@ -162,15 +162,20 @@ def sum_signals(signals: Floats, chosen: Integers) -> Floats:
 def choose_signals(task: Task, rewards: Sequence[str] | None) -> Integers:
     """Returns the places of the named reward signals; `InputError` for a wrong name."""
     names = task.rewards if rewards is None else rewards
-    valid = "names out of " + ", ".join(task.rewards)
-    if isinstance(names, str) or not names:
-        raise InputError("rewards", names, f"one or more {valid}")
-    for name in names:
-        if name not in task.rewards:
-            raise InputError("rewards", name, valid)
-    if len(set(names)) < len(names):
-        raise InputError("rewards", tuple(names), "each name only once")
+    check_names("rewards", names, task.rewards)
     return np.array([task.rewards.index(name) for name in names], np.int64)
+
+
+def check_names(thing: str, names: Sequence[str], known: Sequence[str]) -> None:
+    """Raises `InputError` unless they are one or more of the known names, each only once."""
+    valid = "names out of " + ", ".join(known)
+    if isinstance(names, str) or not names:
+        raise InputError(thing, names, f"one or more {valid}")
+    for name in names:
+        if name not in known:
+            raise InputError(thing, name, valid)
+    if len(set(names)) < len(names):
+        raise InputError(thing, tuple(names), "each name only once")
 
 
 def check_moves(moves: str) -> bool:

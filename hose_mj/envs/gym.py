@@ -9,16 +9,14 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from hose_mj.envs.drawing import RENDER_MODES, Renderer
-from hose_mj.envs.episode import Episode, check_moves, sum_signals
-from hose_mj.envs.options import build_task, refuse_reset_options
+from hose_mj.envs.episode import check_moves, sum_signals
+from hose_mj.envs.interface import Interface, build_task, refuse_reset_options
 from hose_mj.envs.view import Form, View
 from hose_mj.errors import InputError
-from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.task import Task
 
 
-class TaskEnv(gymnasium.Env[Any, Any]):
+class TaskEnv(Interface, gymnasium.Env[Any, Any]):
     """All agents of a task as one actor.
 
     The action is an integer for a task of one agent and one integer for each agent otherwise
@@ -45,8 +43,6 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         InputError: an unknown task, option or name, or a value outside its valid set.
     """
 
-    metadata = {"render_modes": RENDER_MODES, "render_fps": 10}  # noqa: RUF012
-
     def __init__(
         self,
         task: str | Task,
@@ -58,10 +54,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        self.task = build_task(task, options)
-        self.episode = Episode(self.task, rewards)
-        self.render_mode = render_mode
-        self._renderer = Renderer(self.task, render_mode)
+        super().__init__(build_task(task, options), rewards, render_mode)
         self.at_once = check_moves(moves)
         self._view = View(self.task, observe, form, range(self.task.n_agents))
         self.observation_space = self._view.make_space()
@@ -80,7 +73,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         Raises:
             InputError: options, of which there are none.
         """
-        super().reset(seed=seed)
+        gymnasium.Env.reset(self, seed=seed)
         refuse_reset_options(options)
         self.episode.reset(self.np_random)
         self._renderer.follow(self.episode)
@@ -97,18 +90,6 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         reward = float(sum_signals(episode.compute_team_signals(), episode.chosen))
         self._renderer.follow(episode)
         return self._observe(), reward, episode.terminated, episode.truncated, self._make_info()
-
-    def state(self) -> Integers:
-        """Returns a copy of the task's state, with turn and step count before it."""
-        return self.episode.state.copy()
-
-    def render(self) -> Any:
-        """Returns the picture that `render_mode` asks for; None without one."""
-        return self._renderer.render(self.episode)
-
-    def close(self) -> None:
-        """Ends the rendering; may be called again."""
-        self._renderer.close()
 
     def _observe(self) -> Any:
         return self._view.shape(self._view.look(self.task.kernel, self.episode.state))

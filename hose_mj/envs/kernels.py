@@ -1,4 +1,4 @@
-"""What the interfaces add to a task's rules, compiled: who moves when, feels what, sees what.
+"""The interfaces' part of the rules, compiled: who moves when, gets which rewards, sees what.
 
 The first argument of each function is the task's kernel record, as in `hose_mj.tasks.kernels`.
 """
@@ -12,7 +12,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.jit import jitable, kernel
+from hose_mj.jit import jitable, kernel, parallel
 from hose_mj.tasks.kernels import (
     TURN,
     Floats,
@@ -26,6 +26,7 @@ from hose_mj.tasks.kernels import (
     observe,
     reset,
 )
+from hose_mj.tasks.stream import Stream
 
 Flags = npt.NDArray[np.int8]
 
@@ -49,8 +50,8 @@ class Batch(NamedTuple):
         states: (n, state_size).
         streams: random numbers of each copy (n, 1).
         over: 1 where the episode has ended, so that the next step starts a new one (n,).
-        charged: the events that each agent caused (n, n_agents).
-        felt: reward of each mover's events, for each agent, by signal
+        caused_events: the events that each agent caused (n, n_agents).
+        reward_by_mover: reward of each mover's events, for each agent, by signal
             (n, n_agents, n_agents, n_signals).
         values: work arrays of observed values (n, n_variables).
         seen: the chosen values (n, n_seen).
@@ -61,10 +62,10 @@ class Batch(NamedTuple):
     """
 
     states: Integers
-    streams: npt.NDArray[np.uint64]
+    streams: Stream
     over: Flags
-    charged: Integers
-    felt: Floats
+    caused_events: Integers
+    reward_by_mover: Floats
     values: Integers
     seen: Integers
     allowed: Flags
@@ -74,48 +75,62 @@ class Batch(NamedTuple):
 
 
 @jitable
-def forget(charged, felt):  # type: ignore[no-untyped-def]
-    """Clears what the last step left: the agents' events, and who felt what; see `Batch`."""
-    charged[:] = 0
-    felt[:] = 0.0
+def forget(caused_events: Integers, reward_by_mover: Floats) -> None:
+    """Clears what the last step left: the agents' events, and the rewards; see `Batch`."""
+    caused_events[:] = 0
+    reward_by_mover[:] = 0.0
 
 
 @jitable
-def play_turn(record, state, action, charged, felt):  # type: ignore[no-untyped-def]
+def play_turn(
+    record: Any, state: Integers, action: int, caused_events: Integers, reward_by_mover: Floats
+) -> int:
     """Lets the agent whose turn it is move, adds to its rows and returns the events."""
     mover = state[TURN]
     events = apply(record, state, mover, action)
-    charged[mover] |= events
+    caused_events[mover] |= events
     for agent in range(record.n_agents):
-        add_rewards(record, events, mover, agent, felt[mover, agent])
+        add_rewards(record, events, mover, agent, reward_by_mover[mover, agent])
     return events
 
 
 @jitable
-def play_round(record, state, actions, charged, felt):  # type: ignore[no-untyped-def]
+def play_round(
+    record: Any,
+    state: Integers,
+    actions: Integers,
+    caused_events: Integers,
+    reward_by_mover: Floats,
+) -> int:
     """Lets all agents move, each in its turn until the episode ends, and returns all events."""
-    forget(charged, felt)
+    forget(caused_events, reward_by_mover)
     events = 0
     for agent in range(record.n_agents):
-        events |= play_turn(record, state, actions[agent], charged, felt)
+        events |= play_turn(record, state, actions[agent], caused_events, reward_by_mover)
         if is_over(record, events) or is_cut_off(record, state):
             break
     return events
 
 
 @jitable
-def play_joint(record, state, actions, charged, felt):  # type: ignore[no-untyped-def]
+def play_joint(
+    record: Any,
+    state: Integers,
+    actions: Integers,
+    caused_events: Integers,
+    reward_by_mover: Floats,
+) -> int:
     """Lets all agents move at once and returns all events."""
-    forget(charged, felt)
-    events = apply_joint(record, state, actions, charged)
+    forget(caused_events, reward_by_mover)
+    events = apply_joint(record, state, actions, caused_events)
     for mover in range(record.n_agents):
         for agent in range(record.n_agents):
-            add_rewards(record, charged[mover], mover, agent, felt[mover, agent])
+            add_rewards(record, caused_events[mover], mover, agent, reward_by_mover[mover, agent])
     return events
 
 
 @jitable
-def look(record, state, sight, values, seen):  # type: ignore[no-untyped-def]
+def look(record: Any, state: Integers, sight: Sight, values: Integers, seen: Integers) -> None:
     """Writes the chosen values (n_seen,); `values` is work space (n_variables,)."""
     last = -1
     for place in range(seen.shape[0]):
@@ -127,7 +142,7 @@ def look(record, state, sight, values, seen):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def allow(record, state, allowed):  # type: ignore[no-untyped-def]
+def allow(record: Any, state: Integers, allowed: Flags) -> None:
     """Writes the action masks of all agents (n_agents, n_actions)."""
     for agent in range(allowed.shape[0]):
         bits = mask(record, state, agent)
@@ -136,17 +151,23 @@ def allow(record, state, allowed):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def play_one(record, batch, sight, actions, at_once, i):  # type: ignore[no-untyped-def]
+def play_one(
+    record: Any, batch: Batch, sight: Sight, actions: Integers, at_once: bool, i: int
+) -> None:
     """Steps copy `i`, or starts its next episode if the last one has ended."""
-    state, charged, felt = batch.states[i], batch.charged[i], batch.felt[i]
+    state, caused_events, reward_by_mover = (
+        batch.states[i],
+        batch.caused_events[i],
+        batch.reward_by_mover[i],
+    )
     if batch.over[i]:
         reset(record, state, batch.streams[i])
-        forget(charged, felt)
+        forget(caused_events, reward_by_mover)
         events = 0
     elif at_once:
-        events = play_joint(record, state, actions[i], charged, felt)
+        events = play_joint(record, state, actions[i], caused_events, reward_by_mover)
     else:
-        events = play_round(record, state, actions[i], charged, felt)
+        events = play_round(record, state, actions[i], caused_events, reward_by_mover)
     fresh = batch.over[i]
     batch.events[i] = events
     batch.terminated[i] = not fresh and is_over(record, events)
@@ -157,14 +178,18 @@ def play_one(record, batch, sight, actions, at_once, i):  # type: ignore[no-unty
 
 
 @jitable
-def play_some(record, batch, sight, actions, at_once, begin, end):  # type: ignore[no-untyped-def]
+def play_some(
+    record: Any, batch: Batch, sight: Sight, actions: Integers, at_once: bool, begin: int, end: int
+) -> None:
     """Steps the copies begin .. end - 1 on one core; `actions` is (n, n_agents)."""
     for i in range(begin, end):
         play_one(record, batch, sight, actions, at_once, i)
 
 
-@numba.njit(cache=True, parallel=True, error_model="numpy")
-def play_all(record, batch, sight, actions, at_once, bounds):  # type: ignore[no-untyped-def]
+@parallel
+def play_all(
+    record: Any, batch: Batch, sight: Sight, actions: Integers, at_once: bool, bounds: Integers
+) -> None:
     """Steps all copies over all cores, each part of them, bounds[k] .. bounds[k + 1] - 1, on one.
 
     The parts are few, because handing the arrays over counts references, for which the cores would

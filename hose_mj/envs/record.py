@@ -12,8 +12,8 @@ from typing import Any, Protocol
 import gymnasium
 from pettingzoo.utils import BaseWrapper
 
-from hose_mj.envs.drawing import Moment
-from hose_mj.envs.episode import Episode, sum_signals
+from hose_mj.envs.drawing import Moment, encode_moments, look_at
+from hose_mj.envs.episode import Episode
 from hose_mj.errors import InputError
 from hose_mj.recording.keep import Keep, Played, RecordingFolder
 
@@ -54,11 +54,11 @@ class GridSource:
 
     def begin(self) -> None:
         """Starts anew."""
-        self._moments = [self._look()]
+        self._moments = [look_at(self._episode)]
 
     def follow(self) -> None:
         """Notes a step."""
-        self._moments.append(self._look())
+        self._moments.append(look_at(self._episode))
 
     def summarize(self) -> tuple[float, bool, tuple[str, ...]]:
         """See `Source`; every event that ends an episode, but for the goal, is a break."""
@@ -69,15 +69,7 @@ class GridSource:
 
     def encode(self) -> bytes:
         """See `Source`."""
-        from hose_mj.envs.grid_episode import make_grid_episode
-        from hose_mj.recording.rerun import encode_grid_episode
-
-        return encode_grid_episode(make_grid_episode(self._episode.task, self._moments))
-
-    def _look(self) -> Moment:
-        episode = self._episode
-        reward = float(sum_signals(episode.compute_team_signals(), episode.chosen))
-        return Moment(episode.state.copy(), episode.events, reward)
+        return encode_moments(self._episode.task, self._moments)
 
 
 def find_source(env: Any) -> Source:

@@ -18,7 +18,7 @@ from gymnasium.vector.utils import batch_space
 from hose_mj.envs import kernels
 from hose_mj.envs.episode import check_moves, choose_signals, compute_team_signals, sum_signals
 from hose_mj.envs.gym import make_action_space
-from hose_mj.envs.options import build_task, refuse_reset_options
+from hose_mj.envs.interface import build_task, refuse_reset_options
 from hose_mj.envs.view import Form, View
 from hose_mj.errors import InputError
 from hose_mj.jit import compile_notice
@@ -134,10 +134,10 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
             InputError: actions of another shape or out of range, or no reset before.
         """
         if not self._begun:
-            raise InputError("episode", "not begun", "one that runs; call reset() first")
+            raise InputError.about("cannot step an episode that has not begun: call reset() first")
         self._play(self._check_actions(actions))
         batch = self._batch
-        rewards = sum_signals(compute_team_signals(batch.felt), self._chosen)
+        rewards = sum_signals(compute_team_signals(batch.reward_by_mover), self._chosen)
         ended = batch.terminated.astype(np.bool_), batch.truncated.astype(np.bool_)
         return self._observe(), rewards, *ended, self._make_infos()
 
@@ -193,7 +193,7 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
 
     def _make_infos(self) -> dict[str, Any]:
         batch, n = self._batch, self.num_envs
-        signals = compute_team_signals(batch.felt)
+        signals = compute_team_signals(batch.reward_by_mover)
         masks = batch.allowed.copy() if self.task.n_agents > 1 else batch.allowed[:, 0].copy()
         by_name: dict[str, Any] = {}
         for place, name in enumerate(self.task.rewards):
@@ -202,7 +202,7 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
             "action_mask": masks,
             "events": self._event_names[batch.events],
             "signals": by_name,
-            "agent_rewards": sum_signals(batch.felt.sum(axis=1), self._chosen),
+            "agent_rewards": sum_signals(batch.reward_by_mover.sum(axis=1), self._chosen),
         }
         return infos | {f"_{name}": np.ones(n, np.bool_) for name in infos}
 
@@ -214,8 +214,8 @@ def make_batch(task: Task, n: int, n_seen: int) -> kernels.Batch:
         states=np.zeros((n, task.state_size), np.int64),
         streams=np.zeros((n, 1), np.uint64),
         over=np.ones(n, flags),
-        charged=np.zeros((n, n_agents), np.int64),
-        felt=np.zeros((n, n_agents, n_agents, len(task.rewards))),
+        caused_events=np.zeros((n, n_agents), np.int64),
+        reward_by_mover=np.zeros((n, n_agents, n_agents, len(task.rewards))),
         values=np.zeros((n, len(task.variables)), np.int64),
         seen=np.zeros((n, n_seen), np.int64),
         allowed=np.zeros((n, n_agents, task.n_actions), flags),

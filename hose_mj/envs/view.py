@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from hose_mj.envs import kernels
+from hose_mj.envs.episode import check_names
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.task import Task
@@ -77,8 +78,10 @@ class View:
         # A mapping would be sorted by name, a sequence of pairs keeps its order.
         return spaces.Dict([(name, spaces.Discrete(int(count))) for name, count in pairs])
 
-    def make_box(self) -> spaces.Box:
-        """Makes the bounds of an array as a Box, which PettingZoo's tests want."""
+    def make_agent_space(self) -> spaces.Space[Any]:
+        """Makes the space for PettingZoo, whose tests want a Box for an array."""
+        if self.form != "array":
+            return self.make_space()
         high = np.maximum(self.cardinalities - 1, 1)
         return spaces.Box(np.zeros_like(high), high, dtype=np.int64)
 
@@ -112,14 +115,7 @@ def choose_variables(task: Task, observe: Sequence[str] | None) -> tuple[Variabl
     if observe is None:
         return task.variables
     known = {variable.name: variable for variable in task.variables}
-    valid = "names out of " + ", ".join(known)
-    if isinstance(observe, str) or not observe:
-        raise InputError("observe", observe, f"one or more {valid}")
-    for name in observe:
-        if name not in known:
-            raise InputError("observe", name, valid)
-    if len(set(observe)) < len(observe):
-        raise InputError("observe", tuple(observe), "each name only once")
+    check_names("observe", observe, tuple(known))
     return tuple(known[name] for name in observe)
 
 

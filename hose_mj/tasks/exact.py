@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
+from hose_mj.tasks.search import NOT_FOUND, TOO_MANY, search
 from hose_mj.tasks.task import Task
 
 OVER = -1
@@ -85,13 +86,13 @@ def enumerate_joint(task: Task, starts: Iterable[Integers], limit: int = 10**6) 
     """
     joint_actions = np.array(list(product(range(task.n_actions), repeat=task.n_agents)), np.int64)
     rewards = np.zeros(len(task.rewards))
-    charged = np.zeros(task.n_agents, np.int64)
+    caused_events = np.zeros(task.n_agents, np.int64)
 
     def play(state: Integers, action: int) -> tuple[int, list[float]]:
-        events = kernels.apply_joint(task.kernel, state, joint_actions[action], charged)
+        events = kernels.apply_joint(task.kernel, state, joint_actions[action], caused_events)
         got = []
         for agent in range(task.n_agents):
-            kernels.compute_joint_rewards(task.kernel, charged, agent, rewards)
+            kernels.compute_joint_rewards(task.kernel, caused_events, agent, rewards)
             got.append(float(rewards.sum()))
         return events, got
 
@@ -176,3 +177,30 @@ def solve(
         change = float(np.abs(new - q_values).max())
         q_values = new
     return q_values
+
+
+def find_shortest(task: Task, state: Integers, limit: int = 4_000_000) -> int | None:
+    """Returns the fewest moves of single agents, in turns, from a state to the goal.
+
+    The step limit plays no part in it.
+
+    Args:
+        task: a compiled `Task` without chance.
+        state: where the search starts; its turn counts.
+        limit: most states to visit.
+
+    Returns:
+        The number of moves, or None if the goal cannot be reached.
+
+    Raises:
+        InputError: more states than the limit.
+    """
+    width = len(state)
+    slots = 1 << int(np.ceil(np.log2(2 * limit)))
+    states = np.zeros((limit, width), np.int16)
+    moves = search(
+        task.kernel, state.copy(), states, np.full(slots, -1, np.int32), np.zeros(width, np.int64)
+    )
+    if moves == TOO_MANY:
+        raise InputError("task", task.id, f"one that {limit} states are enough for")
+    return None if moves == NOT_FOUND else int(moves)

@@ -17,13 +17,13 @@ FIRST, SECOND, NEITHER = 0, 1, 2
 
 
 @dispatched
-def find_target(record: Any, state: Integers, robot: int, action: int) -> int:
+def compute_target(record: Any, state: Integers, robot: int, action: int) -> int:
     """Returns the number of the cell that an action leads to, or of the robot's own."""
     raise NotImplementedError(type(record).__name__)
 
 
 @jitable
-def pack(actions):  # type: ignore[no-untyped-def]
+def pack(actions: Integers) -> int:
     """Packs the actions (n,), each below 7."""
     packed = 0
     for robot in range(actions.shape[0]):
@@ -32,19 +32,19 @@ def pack(actions):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def unpack(packed, robot):  # type: ignore[no-untyped-def]
+def unpack(packed: int, robot: int) -> int:
     """Returns a robot's action."""
     return packed >> 3 * robot & 7
 
 
 @jitable
-def cancel(packed, robot):  # type: ignore[no-untyped-def]
+def cancel(packed: int, robot: int) -> int:
     """Returns the packed actions with the robot's cancelled."""
     return packed | CANCELLED << 3 * robot
 
 
 @jitable
-def settle(record, state, n_robots, packed, winner):  # type: ignore[no-untyped-def]
+def settle(record: Any, state: Integers, n_robots: int, packed: int, winner: int) -> int:
     """Cancels moves until all that are left can be made at once, and returns the packed actions.
 
     A robot that stays keeps its cell, two that would change places both stay, and of two that enter
@@ -61,12 +61,14 @@ def settle(record, state, n_robots, packed, winner):  # type: ignore[no-untyped-
 
 
 @jitable
-def settle_pair(record, state, packed, one, other, winner):  # type: ignore[no-untyped-def]
+def settle_pair(
+    record: Any, state: Integers, packed: int, one: int, other: int, winner: int
+) -> int:
     """Cancels what two robots cannot do at once and returns the packed actions."""
-    from_one = find_target(record, state, one, CANCELLED)
-    from_other = find_target(record, state, other, CANCELLED)
-    to_one = find_target(record, state, one, unpack(packed, one))
-    to_other = find_target(record, state, other, unpack(packed, other))
+    from_one = compute_target(record, state, one, CANCELLED)
+    from_other = compute_target(record, state, other, CANCELLED)
+    to_one = compute_target(record, state, one, unpack(packed, one))
+    to_other = compute_target(record, state, other, unpack(packed, other))
     if to_one == to_other:
         if to_one != from_one and (to_other == from_other or winner != FIRST):
             packed = cancel(packed, one)

@@ -24,14 +24,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
 from numba.extending import overload
 
 from hose_mj.jit import compiled, jitable
-from hose_mj.tasks.stream import draw_below
+from hose_mj.tasks.stream import Stream, draw_below
 
 TURN, STEPS = 0, 1
 HEADER = 2
@@ -41,29 +41,41 @@ Integers = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
 
-def dispatched(function: Callable[..., Any]) -> Any:
+class Dispatched(Protocol):
+    """A function that `dispatched` made."""
+
+    def __call__(self, record: Any, *arguments: Any) -> Any:
+        """Runs the code of the record's type."""
+        ...
+
+    def register(self, kind: Any, function: Any = None) -> Callable[[Callable[..., Any]], Any]:
+        """Makes a function the code of one type of record."""
+        ...
+
+
+def dispatched(function: Callable[..., Any]) -> Dispatched:
     """Makes a function whose code depends on the type of its first argument.
 
     Like `functools.singledispatch`, and with `register` as there, but compiled code may call it
     too. (Compiled functions handed over as arguments would miss the cache in every process.)
     """
-    function = functools.singledispatch(function)
+    chooser = functools.singledispatch(function)
 
     # Inlined: a call would copy all fields of the record onto the stack, at every move.
-    @overload(function, jit_options={"forceinline": True})
-    def choose(record, *arguments):  # type: ignore[no-untyped-def]
-        implementation = function.dispatch(record.instance_class)
+    @overload(chooser, jit_options={"forceinline": True})
+    def choose(record: Any, *arguments: Any) -> Any:
+        implementation = chooser.dispatch(record.instance_class)
 
-        def call(record, *arguments):  # type: ignore[no-untyped-def]
+        def call(record: Any, *arguments: Any) -> Any:
             return implementation(record, *arguments)
 
         return call
 
-    return function
+    return cast(Dispatched, chooser)
 
 
 @dispatched
-def reset(record: Any, state: Integers, stream: npt.NDArray[np.uint64]) -> None:
+def reset(record: Any, state: Integers, stream: Stream) -> None:
     """Writes an initial state; every random choice is drawn from the stream."""
     raise NotImplementedError(type(record).__name__)
 
@@ -75,14 +87,14 @@ def apply(record: Any, state: Integers, agent: int, action: int) -> int:
 
 
 @dispatched
-def apply_joint(record: Any, state: Integers, actions: Integers, charged: Integers) -> int:
+def apply_joint(record: Any, state: Integers, actions: Integers, caused_events: Integers) -> int:
     """Lets all agents move at once and returns all events.
 
     Args:
         record: the task's kernel record.
         state: advanced in place; the turn goes back to agent 0.
         actions: one for each agent (n_agents,).
-        charged: the events that each agent caused (n_agents,), written in place.
+        caused_events: the events that each agent caused (n_agents,), written in place.
     """
     raise NotImplementedError(type(record).__name__)
 
@@ -98,72 +110,74 @@ def observe(record: Any, state: Integers, agent: int, values: Integers) -> None:
 
 @dispatched
 @jitable
-def mask(record, state, agent):  # type: ignore[no-untyped-def]
+def mask(record: Any, state: Integers, agent: int) -> int:
     """Returns the available actions as bits; all of them, unless the task says otherwise."""
     return (1 << record.n_actions) - 1
 
 
 @jitable
-def begin(state):  # type: ignore[no-untyped-def]
+def begin(state: Integers) -> None:
     """Sets turn and step count of an initial state."""
     state[TURN] = 0
     state[STEPS] = 0
 
 
 @jitable
-def end_turn(record, state, agent):  # type: ignore[no-untyped-def]
+def end_turn(record: Any, state: Integers, agent: int) -> None:
     """Hands the turn to the next agent and counts the move."""
     state[TURN] = agent + 1 if agent + 1 < record.n_agents else 0
     state[STEPS] += 1
 
 
 @jitable
-def end_joint(record, state):  # type: ignore[no-untyped-def]
+def end_joint(record: Any, state: Integers) -> None:
     """Hands the turn to agent 0 and counts a move of every agent."""
     state[TURN] = 0
     state[STEPS] += record.n_agents
 
 
 @jitable
-def is_over(record, events):  # type: ignore[no-untyped-def]
+def is_over(record: Any, events: int) -> bool:
     """Whether the events end the episode."""
     return events & record.terminal != 0
 
 
 @jitable
-def is_cut_off(record, state):  # type: ignore[no-untyped-def]
+def is_cut_off(record: Any, state: Integers) -> bool:
     """Whether the step limit is reached."""
     return state[STEPS] >= record.step_limit
 
 
 @jitable
-def add_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyped-def]
+def add_rewards(record: Any, events: int, mover: int, agent: int, rewards: Floats) -> None:
     """Adds what the agent gets for the events of a move of `mover`, by signal (n_signals,)."""
-    felt = events if agent == mover else events & record.shared
+    counted = events if agent == mover else events & record.shared
     for signal in range(rewards.shape[0]):
-        rewards[signal] += record.reward_table[felt, signal]
+        rewards[signal] += record.reward_table[counted, signal]
 
 
 @jitable
-def compute_rewards(record, events, mover, agent, rewards):  # type: ignore[no-untyped-def]
+def compute_rewards(record: Any, events: int, mover: int, agent: int, rewards: Floats) -> None:
     """Writes what the agent gets for the events of a move of `mover`, by signal (n_signals,)."""
     rewards[:] = 0.0
     add_rewards(record, events, mover, agent, rewards)
 
 
 @jitable
-def compute_joint_rewards(record, charged, agent, rewards):  # type: ignore[no-untyped-def]
+def compute_joint_rewards(
+    record: Any, caused_events: Integers, agent: int, rewards: Floats
+) -> None:
     """Writes what the agent gets for a joint move, by signal (n_signals,).
 
     It is the sum over the movers of what `compute_rewards` gives for each one's events.
     """
     rewards[:] = 0.0
     for mover in range(record.n_agents):
-        add_rewards(record, charged[mover], mover, agent, rewards)
+        add_rewards(record, caused_events[mover], mover, agent, rewards)
 
 
 @jitable
-def compute_safe_mask(record, state, agent, scratch):  # type: ignore[no-untyped-def]
+def compute_safe_mask(record: Any, state: Integers, agent: int, scratch: Integers) -> int:
     """Returns, as bits, the available actions that break no constraint at once.
 
     It tries each of them on `scratch`, an array of the state's length.
@@ -194,7 +208,7 @@ class Projection(NamedTuple):
 
 
 @jitable
-def project(projection, values):  # type: ignore[no-untyped-def]
+def project(projection: Projection, values: Integers) -> int:
     """Returns the index of the values (n_variables,) that `observe` wrote."""
     index = 0
     for k in range(projection.columns.shape[0]):
@@ -203,7 +217,14 @@ def project(projection, values):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def run_random(record, state, stream, n_moves, values, counts):  # type: ignore[no-untyped-def]
+def run_random(
+    record: Any,
+    state: Integers,
+    stream: Stream,
+    n_moves: int,
+    values: Integers,
+    counts: Integers,
+) -> None:
     """Plays random moves, agents in turn, observing before each one; for timing and tests.
 
     Args:

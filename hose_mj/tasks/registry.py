@@ -1,4 +1,17 @@
-"""The tasks by id, imported when they are made."""
+"""The tasks by id, imported when they are made; those of other packages too.
+
+A package adds a task by an entry point of the group `hose_mj.tasks`, named as the task's id, whose
+value is a `TaskEntry`:
+
+    [project.entry-points."hose_mj.tasks"]
+    rope-pull = "my_package:ROPE_PULL"
+
+    ROPE_PULL = TaskEntry("my_package.rope_pull", "Settings", "make", "two robots pull a rope")
+
+Its module has the settings, a frozen dataclass with a field `step_limit`, and the factory, which
+takes the settings and returns a `Task` (`hose_mj.tasks.task.compose_task` makes one) after its
+kernels have been registered. Commands, learners and environments then take its id.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +19,11 @@ import dataclasses
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING, Any, cast
 
 from hose_mj.errors import InputError
+from hose_mj.plugins import find_plugins, load_plugin
 
 if TYPE_CHECKING:
     from hose_mj.tasks.task import Task
@@ -25,6 +40,7 @@ class TaskEntry:
         description: one line for listings.
         presets: settings that make the id; they cannot be given.
         defaults: settings that differ from the class's defaults; they can.
+        is_alone: whether the task has one agent whatever its settings.
     """
 
     module: str
@@ -33,6 +49,7 @@ class TaskEntry:
     description: str
     presets: Mapping[str, Any] = field(default_factory=dict)
     defaults: Mapping[str, Any] = field(default_factory=dict)
+    is_alone: bool = False
 
 
 _LINE = ("hose_mj.tasks.line.settings", "LineSettings", "make_line")
@@ -52,6 +69,7 @@ TASKS: dict[str, TaskEntry] = {
         *_LINE,
         "one agent moves all robots of the hose, one at a time (chapter 5)",
         {"own_goals": False, "single_agent": True},
+        is_alone=True,
     ),
     "line-2015": TaskEntry(
         *_LINE,
@@ -77,6 +95,7 @@ TASKS: dict[str, TaskEntry] = {
         *_TAXI,
         "one agent chooses for both taxis at once (section 5.5.2)",
         {"single_agent": True},
+        is_alone=True,
     ),
     "corridor": TaskEntry(
         "hose_mj.tasks.tiny.settings",
@@ -89,23 +108,58 @@ TASKS: dict[str, TaskEntry] = {
         "MazeSettings",
         "make_maze",
         "one robot among the walls of Table 5.1",
+        is_alone=True,
     ),
 }
+
+
+GROUP = "hose_mj.tasks"
+
+
+def find_task_plugins() -> dict[str, EntryPoint]:
+    """Returns the entry points of other packages' tasks by id; imports none of them.
+
+    Raises:
+        InputError: an id that is taken.
+    """
+    return find_plugins(GROUP, TASKS)
+
+
+def list_tasks() -> dict[str, TaskEntry]:
+    """Returns all tasks by id, those of other packages last.
+
+    Raises:
+        InputError: an id that is taken, or a package whose entry cannot be imported.
+    """
+    plugins = {id: load_plugin(entry, TaskEntry) for id, entry in find_task_plugins().items()}
+    return {**TASKS, **plugins}
+
+
+def find_task(id: str) -> TaskEntry:
+    """Returns the entry of a task.
+
+    Raises:
+        InputError: an unknown id, or a package whose entry cannot be imported.
+    """
+    if id in TASKS:
+        return TASKS[id]
+    plugins = find_task_plugins()
+    if id not in plugins:
+        raise InputError("task", id, "one of " + ", ".join([*TASKS, *plugins]))
+    return cast(TaskEntry, load_plugin(plugins[id], TaskEntry))
 
 
 def make_task(id: str, **settings: Any) -> Task:
     """Makes a task.
 
     Args:
-        id: a key of `TASKS`.
+        id: a key of `list_tasks`.
         settings: options of the task, the fields of its settings class.
 
     Raises:
         InputError: an unknown id or option, or a value outside its valid set.
     """
-    if id not in TASKS:
-        raise InputError("task", id, "one of " + ", ".join(TASKS))
-    entry = TASKS[id]
+    entry = find_task(id)
     module = importlib.import_module(entry.module)
     kind = getattr(module, entry.settings)
     options = [f.name for f in dataclasses.fields(kind) if f.name not in entry.presets]

@@ -20,7 +20,7 @@ def make_stream(generator: np.random.Generator) -> Stream:
 
 
 @inlined
-def draw_bits(stream):  # type: ignore[no-untyped-def]
+def draw_bits(stream: Stream) -> np.uint64:
     """Draws 64 random bits (uint64)."""
     stream[0] += np.uint64(0x9E3779B97F4A7C15)
     bits = stream[0]
@@ -30,7 +30,7 @@ def draw_bits(stream):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def draw_below(stream, count):  # type: ignore[no-untyped-def]
+def draw_below(stream: Stream, count: int) -> np.int64:
     """Draws an integer uniformly from 0 .. count - 1, for a count of 1 to 2^31."""
     bound = np.uint64(count)
     product = (draw_bits(stream) >> np.uint64(32)) * bound
@@ -45,6 +45,6 @@ def draw_below(stream, count):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def draw_unit(stream):  # type: ignore[no-untyped-def]
+def draw_unit(stream: Stream) -> float:
     """Draws a float uniformly from the multiples of 2^-53 in [0, 1)."""
     return np.float64(draw_bits(stream) >> np.uint64(11)) * 2.0**-53

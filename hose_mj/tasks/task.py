@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import Floats, Integers, Projection
+from hose_mj.tasks.kernels import HEADER, Floats, Integers, Projection
 from hose_mj.tasks.stream import Stream
 from hose_mj.tasks.variables import Variable, make_projection
 
@@ -43,11 +43,11 @@ class Task:
     variables: tuple[Variable, ...]
     rewards: tuple[str, ...]
     events: tuple[str, ...]
-    schedule: Schedule
     settings: Any
     kernel: Any
     layout: Mapping[str, slice]
     state_size: int
+    schedule: Schedule = "turns"
 
     @property
     def n_agents(self) -> int:
@@ -89,6 +89,45 @@ class Task:
         return make_projection(self.variables, names)
 
 
+def compose_task(
+    record: Callable[..., Any],
+    *,
+    rewards: Mapping[str, Mapping[str, float]],
+    sizes: Mapping[str, int],
+    terminal: Collection[str],
+    violations: Collection[str],
+    success: Collection[str],
+    shared: Collection[str],
+    **names: Any,
+) -> Task:
+    """Makes a task and its record, the fields that every record has from names.
+
+    Args:
+        record: the NamedTuple with its own fields given (`functools.partial`).
+        rewards: for each signal, what each event is worth, see `make_reward_table`.
+        sizes: lengths of the parts of the state after its header, in order.
+        terminal: the events that end an episode.
+        violations: the events that break a constraint.
+        success: the events that mean that the task is done.
+        shared: the events that every agent is rewarded for.
+        names: the other fields of the `Task`; its settings have a `step_limit`.
+    """
+    events = names["events"]
+    layout, end = {}, HEADER
+    for name, size in sizes.items():
+        layout[name] = slice(end, end + size)
+        end += size
+    sets = {"terminal": terminal, "violations": violations, "success": success, "shared": shared}
+    kernel = record(
+        n_agents=len(names["agents"]),
+        n_actions=len(names["action_names"]),
+        step_limit=names["settings"].step_limit,
+        reward_table=make_reward_table(events, rewards),
+        **{kind: sum(1 << events.index(name) for name in chosen) for kind, chosen in sets.items()},
+    )
+    return Task(rewards=tuple(rewards), kernel=kernel, layout=layout, state_size=end, **names)
+
+
 def make_reward_table(
     events: tuple[str, ...], rewards: Mapping[str, Mapping[str, float]]
 ) -> Floats:
@@ -99,6 +138,6 @@ def make_reward_table(
         rewards: for each signal, what an event is worth; an event that is not named is worth 0,
             and the reward of a set is the sum over its events.
     """
-    values = np.array([[worth.get(name, 0.0) for worth in rewards.values()] for name in events])
+    values = np.array([[signal.get(name, 0.0) for signal in rewards.values()] for name in events])
     sets = np.array([bits[::-1] for bits in product((0.0, 1.0), repeat=len(events))])
     return np.ascontiguousarray(sets @ values)

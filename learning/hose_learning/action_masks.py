@@ -153,8 +153,8 @@ class MaskedEnv(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         if self.learns:
             actions = (action,) if len(actors) == 1 else split_action(self._inner.task, action)
             for agent, chosen in zip(actors, actions, strict=True):
-                if episode.charged[agent]:
-                    self.masks.learn(before, agent, int(chosen), int(episode.charged[agent]))
+                if episode.caused_events[agent]:
+                    self.masks.learn(before, agent, int(chosen), int(episode.caused_events[agent]))
         return observation, reward, terminated, truncated, info
 
     def action_masks(self) -> Mask:

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from hose_mj.envs.episode import Episode, sum_signals
-from hose_mj.envs.options import build_task, refuse_reset_options
+from hose_mj.envs.interface import build_task, refuse_reset_options
 from hose_mj.envs.view import View
 from hose_mj.tasks.task import Task
 

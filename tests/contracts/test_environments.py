@@ -26,9 +26,9 @@ from pettingzoo.test import (
     seed_test,
 )
 
+from hose_mj.envs import ALONE, IDS
 from hose_mj.envs.dm import DmEnv
 from hose_mj.envs.gym import TaskEnv
-from hose_mj.envs.registration import ALONE, IDS
 from hose_mj.envs.vector import VectorTaskEnv
 from hose_mj.tasks.registry import TASKS, make_task
 

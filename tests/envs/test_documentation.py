@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hose_mj.envs.registration import IDS
+from hose_mj.envs import IDS
 from tools import task_pictures
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,10 +38,19 @@ def test_the_ids_in_the_documentation_are_those_registered():
         assert set(re.findall(r"hose_mj/\w+-v0", text)) <= set(IDS)
 
 
-def test_an_id_is_found_by_naming_the_package():
+@pytest.mark.parametrize(
+    ("first", "id"),
+    [
+        ("pass", "hose_mj.envs:hose_mj/Maze-v0"),
+        ("pass", "hose_mj:hose_mj/Maze-v0"),
+        ("import hose_mj", "hose_mj/Maze-v0"),
+        ("import hose_mj.envs", "hose_mj/Maze-v0"),
+    ],
+)
+def test_an_id_is_found_by_importing_or_naming_the_package(first, id):
     code = (
-        "import gymnasium, warnings; warnings.simplefilter('error');"
-        "env = gymnasium.make('hose_mj.envs:hose_mj/Maze-v0'); print(env.reset(seed=0)[0].shape)"
+        f"import gymnasium, warnings; warnings.simplefilter('error'); {first};"
+        f"assert gymnasium.make({id!r}).reset(seed=0)[0].shape == (6,)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stderr
@@ -54,6 +63,18 @@ def test_importing_the_environments_compiles_and_draws_nothing():
     assert not {"numba", "PIL", "matplotlib", "rerun", "mujoco", "pygame"} & set(
         done.stdout.split()
     )
+
+
+def test_tasks_do_without_the_extra_and_environments_name_it():
+    code = (
+        "import sys;"
+        "sys.modules.update(dict.fromkeys(['gymnasium', 'pettingzoo', 'dm_env', 'PIL']));"
+        "from hose_mj.tasks.registry import TASKS, make_task; [make_task(id) for id in TASKS];"
+        "import hose_mj.envs"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    last = done.stderr.splitlines()[-1]
+    assert "hose_mj.envs needs the extra `rl`: pip install 'hose-mj[rl]'" in last
 
 
 def test_the_picture_in_the_documentation_can_be_drawn():

@@ -7,14 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from hose_mj.envs.drawing import Moment
-from hose_mj.envs.grid_episode import make_grid_episode
+from hose_mj.envs import IDS
+from hose_mj.envs.drawing import GOAL_COLOR, Moment, make_grid_episode, make_picture
 from hose_mj.envs.gym import TaskEnv
-from hose_mj.envs.picture import AGENT_COLORS, ROBOT, TAXI, Picture
-from hose_mj.envs.pictures import GOAL_COLOR, make_picture
-from hose_mj.envs.raster import draw_picture
-from hose_mj.envs.registration import IDS
-from hose_mj.envs.text import write_picture
+from hose_mj.envs.picture import AGENT_COLORS, ROBOT, TAXI, Picture, draw_picture, write_picture
 from hose_mj.errors import InputError
 from hose_mj.recording.rerun import read_recording
 from hose_mj.tasks.registry import make_task

@@ -123,14 +123,14 @@ def test_wrong_actions_of_many_copies(actions):
 def test_a_step_before_the_first_reset_and_after_the_end():
     for env, action in ((TaskEnv("maze"), 0), (TurnsEnv("maze"), 0), (JointEnv("maze"), None)):
         action = {"robot_0": 0} if action is None else action
-        with pytest.raises(InputError, match=r"episode is 'not begun'; valid: .*reset"):
+        with pytest.raises(InputError, match=r"cannot step an episode that has not begun: .*reset"):
             env.step(action)
-    with pytest.raises(InputError, match="episode is 'not begun'"):
+    with pytest.raises(InputError, match="episode that has not begun"):
         VectorTaskEnv("maze", 2).step(np.zeros(2, np.int64))
     env = TaskEnv("maze", step_limit=1)
     env.reset(seed=0)
     assert env.step(1)[3]
-    with pytest.raises(InputError, match=r"episode is 'over'; valid: .*reset"):
+    with pytest.raises(InputError, match=r"cannot step an episode that is over: .*reset"):
         env.step(1)
     env.reset()
     env.step(1)
@@ -142,12 +142,12 @@ def test_a_step_of_turns_after_the_end():
     env.step(2)
     env.step(2)
     assert all(env.truncations.values())
-    with pytest.raises(InputError, match="episode is 'over'"):
+    with pytest.raises(InputError, match="episode that is over"):
         env.step(2)
     env.step(None)
     env.step(None)
     assert env.agents == []
-    with pytest.raises(InputError, match="episode is 'over'"):
+    with pytest.raises(InputError, match="episode that is over"):
         env.step(None)
 
 

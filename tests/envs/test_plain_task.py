@@ -46,12 +46,12 @@ def apply_climb(record: Climb, state, agent, action):
 
 
 @kernels.apply_joint.register
-def apply_joint_climb(record: Climb, state, actions, charged):
+def apply_joint_climb(record: Climb, state, actions, caused_events):
     for agent in range(2):
         state[HEADER + agent] += actions[agent]
-        charged[agent] = int(state[HEADER + agent] == GOAL)
+        caused_events[agent] = int(state[HEADER + agent] == GOAL)
     end_joint(record, state)
-    return int(charged.max())
+    return int(caused_events.max())
 
 
 @kernels.observe.register

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from hose_mj.envs import IDS
 from hose_mj.envs.dm import DmEnv
 from hose_mj.envs.gym import TaskEnv
 from hose_mj.envs.parallel import JointEnv
-from hose_mj.envs.registration import IDS
 from hose_mj.envs.turns import TurnsEnv
 from hose_mj.envs.vector import VectorTaskEnv
 from hose_mj.tasks.registry import make_task

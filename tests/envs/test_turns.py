@@ -23,7 +23,7 @@ def test_what_last_returns_is_the_sum_over_the_cycle(task):
         _, reward, terminated, truncated, info = env.last()
         assert reward == pytest.approx(info["cycle_rewards"].sum())
         assert reward == pytest.approx(sum(info["signals"].values()))
-        assert set(info["charged"]) <= set(info["events"])
+        assert set(info["caused_events"]) <= set(info["events"])
         if terminated or truncated:
             env.step(None)
             if not env.agents:
@@ -44,14 +44,15 @@ def test_the_rewards_of_a_cycle_in_the_corridor():
     env.step(RIGHT)
     assert env.agent_selection == "robot_1"
     assert env.last()[4]["cycle_rewards"].tolist() == [100.0]
-    assert env.last()[4]["charged"] == ()
+    assert env.last()[4]["caused_events"] == ()
     assert "goal" in env.last()[4]["events"]
     env.step(LEFT)
     assert env.infos["robot_0"]["cycle_rewards"].tolist() == [100.0, -10.0]
     assert env.infos["robot_0"]["signals"] == {"goal": 100.0, "collision": -10.0}
     assert env.infos["robot_1"]["cycle_rewards"].tolist() == [-10.0]
-    assert "collision" in env.infos["robot_1"]["charged"]
-    assert "collision" not in env.infos["robot_0"]["charged"]
+    assert "collision" in env.infos["robot_1"]["caused_events"]
+    assert "collision" not in env.infos["robot_0"]["caused_events"]
+    assert env.infos["robot_1"]["charged"] == env.infos["robot_1"]["caused_events"]
     assert env.terminations == {"robot_0": True, "robot_1": True}
     assert env.truncations == {"robot_0": False, "robot_1": False}
 

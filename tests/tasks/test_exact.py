@@ -44,12 +44,12 @@ TABLE_61 = {
 def test_table_6_1(stream, winner, contest):
     task = make_task("corridor", winner=winner)
     model = enumerate_joint(task, [task.reset(stream)])
-    charged = np.zeros(2, np.int64)
+    caused_events = np.zeros(2, np.int64)
     for number, actions in enumerate(product(range(3), repeat=2)):
         reward, cells = {**TABLE_61, (RIGHT, LEFT): contest}[actions]
         assert model.rewards[0, number].tolist() == [reward, reward]
         state = task.reset(stream)
-        kernels.apply_joint(task.kernel, state, np.array(actions), charged)
+        kernels.apply_joint(task.kernel, state, np.array(actions), caused_events)
         assert tuple(state[task.layout["robots"]]) == cells
         assert (model.successors[0, number] == OVER) == (1 in cells)
 
@@ -149,7 +149,7 @@ def test_a_joint_move_of_one_agent_is_that_agents_move():
     # Definition 10: a joint action with one action that is not null does what the action does.
     task = make_task("line", n_robots=3, half_width=3, hose_length=6)
     stream = np.array([5], np.uint64)
-    charged = np.zeros(3, np.int64)
+    caused_events = np.zeros(3, np.int64)
     for _ in range(300):
         state = task.reset(stream)
         for agent, action in product(range(3), range(5)):
@@ -157,7 +157,7 @@ def test_a_joint_move_of_one_agent_is_that_agents_move():
             actions = np.full(3, 4)
             actions[agent] = action
             events = kernels.apply(task.kernel, alone, agent, action)
-            assert kernels.apply_joint(task.kernel, jointly, actions, charged) == events
+            assert kernels.apply_joint(task.kernel, jointly, actions, caused_events) == events
             assert (alone[HEADER:] == jointly[HEADER:]).all()
 
 

@@ -5,8 +5,8 @@ import pytest
 import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference_tasks import line as twin
-from reference_tasks.line import LineTwin
+from reference_tasks import line as reference
+from reference_tasks.line import LineReference
 
 from hose_mj.tasks import kernels
 from hose_mj.tasks.line.geometry import (
@@ -45,7 +45,7 @@ def test_cells_that_a_segment_covers(end, cell, covered):
 @given(cells, cells, cells)
 def test_covering_is_that_of_exact_fractions_and_symmetric(a, b, cell):
     covered = covers(*a, *b, *cell)
-    assert covered == twin.covers(a, b, cell)
+    assert covered == reference.covers(a, b, cell)
     assert covered == covers(*b, *a, *cell)
     mirrored = [(-y, x) for x, y in (a, b, cell)]
     assert covered == covers(*mirrored[0], *mirrored[1], *mirrored[2])
@@ -54,10 +54,10 @@ def test_covering_is_that_of_exact_fractions_and_symmetric(a, b, cell):
 def test_a_cover_table_knows_all_cells_around_short_segments():
     table = make_cover_table(2)
     places = list(product(range(-4, 5), repeat=2))
-    ways = list(twin.STEPS.values())
+    ways = list(reference.STEPS.values())
     for row, end in enumerate(product(range(-2, 3), repeat=2)):
         for column, (x, y) in enumerate(places):
-            covered = [twin.covers((0, 0), end, (x + dx, y + dy)) for dx, dy in ways]
+            covered = [reference.covers((0, 0), end, (x + dx, y + dy)) for dx, dy in ways]
             assert table[row, column] == sum(1 << a for a, is_so in enumerate(covered) if is_so)
             assert not (max(abs(x), abs(y)) == 4 and any(covered))
 
@@ -132,9 +132,9 @@ def test_events_of_single_moves(play):
 def test_a_swap(rule, expected, robots):
     task = make_task("line", n_robots=2, start=((0, 2), (0, 1)), goal="none", move_rule=rule)
     state = task.reset(np.array([1], np.uint64))
-    charged = np.zeros(2, np.int64)
-    kernels.apply_joint(task.kernel, state, np.array([DOWN, UP]), charged)
-    assert [set(task.name_events(events)) for events in charged] == expected
+    caused_events = np.zeros(2, np.int64)
+    kernels.apply_joint(task.kernel, state, np.array([DOWN, UP]), caused_events)
+    assert [set(task.name_events(events)) for events in caused_events] == expected
     assert state[task.layout["robots"]].tolist() == robots
 
 
@@ -142,9 +142,9 @@ def test_of_two_that_enter_one_cell_the_second_is_cancelled():
     start = ((0, 3), (1, 2))
     task = make_task("line-2015", n_robots=2, start=start, goal="random")
     state = task.reset(np.array([1], np.uint64))
-    charged = np.zeros(2, np.int64)
-    kernels.apply_joint(task.kernel, state, np.array([DOWN, LEFT]), charged)
-    assert [task.name_events(events) for events in charged] == [(), ("collision",)]
+    caused_events = np.zeros(2, np.int64)
+    kernels.apply_joint(task.kernel, state, np.array([DOWN, LEFT]), caused_events)
+    assert [task.name_events(events) for events in caused_events] == [(), ("collision",)]
     assert state[task.layout["robots"]].tolist() == [0, 2, 1, 2]
 
 
@@ -172,7 +172,7 @@ def count_starts(task, n_samples):
 @pytest.mark.parametrize("id", ["line", "line-non-cooperative"])
 def test_initial_states_are_uniform_over_the_feasible_ones(id):
     task = make_task(id, n_robots=2, half_width=2, hose_length=3)
-    rules = LineTwin(task.settings)
+    rules = LineReference(task.settings)
     chains = []
     for robots in product(rules.offsets, repeat=2):
         last, step = robots
@@ -196,9 +196,12 @@ def test_terminal_states_have_values_within_range():
     start = ((3, 0), (1, 0))
     task = make_task("line", n_robots=2, hose_length=4, half_width=3, start=start, goal="none")
     state = task.reset(np.array([1], np.uint64))
-    charged = np.zeros(2, np.int64)
-    kernels.apply_joint(task.kernel, state, np.array([RIGHT, LEFT]), charged)
-    assert [task.name_events(events) for events in charged] == [("out", "stretch"), ("stretch",)]
+    caused_events = np.zeros(2, np.int64)
+    kernels.apply_joint(task.kernel, state, np.array([RIGHT, LEFT]), caused_events)
+    assert [task.name_events(events) for events in caused_events] == [
+        ("out", "stretch"),
+        ("stretch",),
+    ]
     names = [variable.name for variable in task.variables]
     values = dict(zip(names, task.observe(state, 0), strict=True))
     assert values["p"] == 6 * 7 + 3  # (3, 0), the nearest cell of the grid

@@ -22,7 +22,7 @@ NAMES = [f"{id}-{'-'.join(map(str, settings.values()))}" for id, settings in VAR
 
 
 def walk(pair, n_moves):
-    """Walks task and twin along, with safe moves, reckless ones and joint ones."""
+    """Walks task and reference along, with safe moves, reckless ones and joint ones."""
     task, state = pair.task, pair.state
     choices = np.random.default_rng(7)
     scratch = task.make_state()
@@ -46,11 +46,11 @@ def walk(pair, n_moves):
 
 
 @pytest.mark.parametrize(("id", "settings"), VARIANTS, ids=NAMES)
-def test_the_compiled_task_equals_its_twin(make_pair, id, settings):
+def test_the_compiled_task_equals_its_reference(make_pair, id, settings):
     walk(make_pair(id, **settings), 1000)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("id", "settings"), VARIANTS, ids=NAMES)
-def test_the_compiled_task_equals_its_twin_at_length(make_pair, id, settings):
+def test_the_compiled_task_equals_its_reference_at_length(make_pair, id, settings):
     walk(make_pair(id, **settings), 100_000)

@@ -58,10 +58,10 @@ def test_a_joint_move_adds_up_what_all_movers_caused(stream):
     start = ((3, 0), (1, 0))
     options = {"hose_length": 4, "half_width": 3, "start": start, "goal": "none"}
     task = make_task("line", n_robots=2, **options)
-    charged, rewards = np.zeros(2, np.int64), np.zeros(len(task.rewards))
-    kernels.apply_joint(task.kernel, task.reset(stream), np.array([RIGHT, NONE]), charged)
+    caused_events, rewards = np.zeros(2, np.int64), np.zeros(len(task.rewards))
+    kernels.apply_joint(task.kernel, task.reset(stream), np.array([RIGHT, NONE]), caused_events)
     for agent, expected in enumerate(({"stretch": -50, "out": -50}, {"stretch": -50})):
-        kernels.compute_joint_rewards(task.kernel, charged, agent, rewards)
+        kernels.compute_joint_rewards(task.kernel, caused_events, agent, rewards)
         assert {n: x for n, x in zip(task.rewards, rewards, strict=True) if x} == expected
 
 

@@ -5,9 +5,8 @@ import pytest
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
-from hose_mj.tasks.exact import OVER, enumerate_turns
+from hose_mj.tasks.exact import OVER, enumerate_turns, find_shortest
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.search import find_shortest
 from hose_mj.tasks.stream import make_stream
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 import scipy.stats
-from reference_tasks.twin import TwinStream
+from reference_tasks.reference import ReferenceStream
 
 from hose_mj.tasks.stream import draw_below, draw_bits, draw_unit, make_stream
 
@@ -17,11 +17,11 @@ def test_published_vectors():
     ]
 
 
-def test_bounded_draws_equal_the_twins_and_are_uniform():
-    stream, twin = np.array([3], np.uint64), TwinStream(3)
+def test_bounded_draws_equal_the_references_and_are_uniform():
+    stream, reference = np.array([3], np.uint64), ReferenceStream(3)
     for count in (1, 2, 3, 5, 441, 2**31 - 1, 2**31):
         for _ in range(50):
-            assert draw_below(stream, count) == twin.draw_below(count)
+            assert draw_below(stream, count) == reference.draw_below(count)
     counts = np.bincount([draw_below(stream, 7) for _ in range(7000)], minlength=7)
     assert len(counts) == 7
     assert scipy.stats.chisquare(counts).pvalue > 0.01
@@ -29,11 +29,11 @@ def test_bounded_draws_equal_the_twins_and_are_uniform():
 
 def test_the_rejected_fractions_are_those_that_would_be_unfair():
     # 2^32 mod 3 * 2^29 = 2^30: a quarter of the fractions below the bound would be drawn once more.
-    stream, twin = np.array([9], np.uint64), TwinStream(9)
+    stream, reference = np.array([9], np.uint64), ReferenceStream(9)
     count = 3 * 2**29
     drawn = [draw_below(stream, count) for _ in range(2000)]
-    assert drawn == [twin.draw_below(count) for _ in range(2000)]
-    assert stream[0] == twin.state
+    assert drawn == [reference.draw_below(count) for _ in range(2000)]
+    assert stream[0] == reference.state
     counts = np.bincount(np.array(drawn) // 2**29, minlength=3)
     assert scipy.stats.chisquare(counts).pvalue > 0.01
 

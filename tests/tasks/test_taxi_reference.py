@@ -8,14 +8,14 @@ from hose_mj.tasks.kernels import HEADER, STEPS, TURN
 
 
 def put(pair, taxis, passengers):
-    """Puts task and twin into a state: cells by number, passengers as in the compiled state."""
+    """Puts task and reference into a state: cells by number, passengers as compiled."""
     n = len(taxis)
     names = {0: "waiting", n + 1: "delivered", **{k + 1: k for k in range(n)}}
     pair.state[TURN], pair.state[STEPS] = 0, 0
     pair.state[HEADER:] = [*taxis, *passengers]
-    pair.twin.begin()
-    pair.twin.taxis = [divmod(cell, 5) for cell in taxis]
-    pair.twin.passengers = [names[place] for place in passengers]
+    pair.reference.begin()
+    pair.reference.taxis = [divmod(cell, 5) for cell in taxis]
+    pair.reference.passengers = [names[place] for place in passengers]
 
 
 def list_states():

@@ -19,8 +19,8 @@ def test_every_action_in_every_state_of_the_corridor(make_pair, settings):
     def put(cells):
         pair.state[TURN], pair.state[STEPS] = 0, 0
         pair.state[HEADER:] = cells
-        pair.twin.begin()
-        pair.twin.robots = list(cells)
+        pair.reference.begin()
+        pair.reference.robots = list(cells)
 
     pair.reset()
     for cells in product(range(pair.task.settings.n_cells), repeat=2):
@@ -44,7 +44,7 @@ def test_every_action_in_every_state_of_the_maze(make_pair, settings):
         for action in range(pair.task.n_actions):
             pair.state[TURN], pair.state[STEPS] = 0, 0
             pair.state[HEADER:] = cell
-            pair.twin.begin()
-            pair.twin.at = cell
+            pair.reference.begin()
+            pair.reference.at = cell
             pair.observe(0)
             pair.move_jointly([action])

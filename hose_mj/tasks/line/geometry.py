@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ MARGIN = 2
 
 
 @jitable
-def covers(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
+def covers(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any) -> Any:
     """Whether the segment from a to b meets the open unit square centred on the cell (x, y).
 
     They are apart exactly if an axis separates them: x, y, or the segment's normal, along which the
@@ -37,7 +38,7 @@ def covers(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def find_covered(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
+def compute_covered(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any) -> Any:
     """Returns which of the cells that the actions lead to from (x, y) a segment covers.
 
     Bit a is the cell of action a; bit NONE is (x, y) itself. Whole arrays will do as well.
@@ -52,7 +53,7 @@ def find_covered(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
 
 
 def make_cover_table(reach: int) -> Bytes:
-    """Makes the table of what `find_covered` finds for short segments, from a to b.
+    """Makes the table of what `compute_covered` returns for short segments, from a to b.
 
     Args:
         reach: m, the longest segment in it, in cells along an axis.
@@ -64,7 +65,7 @@ def make_cover_table(reach: int) -> Bytes:
     """
     m = reach
     dx, dy, x, y = np.ogrid[-m : m + 1, -m : m + 1, -m - 2 : m + 3, -m - 2 : m + 3]
-    covered = find_covered(0, 0, dx, dy, x, y).astype(np.uint8)
+    covered = compute_covered(0, 0, dx, dy, x, y).astype(np.uint8)
     return np.ascontiguousarray(covered.reshape((2 * m + 1) ** 2, (2 * m + 5) ** 2))
 
 

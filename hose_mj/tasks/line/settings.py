@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.checks import check_cell, check_cells, check_choice, check_finite, check_integer
-from hose_mj.tasks.kernels import HEADER, Integers
+from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.line import kernels as rules
-
-# The first two are imported for what they register.
-from hose_mj.tasks.line import starts as line_starts
 from hose_mj.tasks.line.geometry import (
     LARGEST_REACH,
     N_DIRECTIONS,
@@ -25,7 +23,7 @@ from hose_mj.tasks.line.geometry import (
     make_distance_table,
     make_offset_table,
 )
-from hose_mj.tasks.task import Task, make_reward_table
+from hose_mj.tasks.task import Task, compose_task
 from hose_mj.tasks.variables import Variable
 
 Cell = tuple[int, int]
@@ -35,8 +33,10 @@ COLLISIONS = {
     "sweeping": rules.SWEEPING,
     "robots": rules.ROBOTS,
 }
-N_DISTANCES = 24
-N_SQUARES = 256
+GOAL_MODES = {"random": rules.RANDOM, "none": rules.ABSENT}
+VIOLATIONS = ("out", "stretch", "collision")
+N_DISTANCES, N_SQUARES = 24, 256
+"""Values of d_g (Table 4.1: distances; with own goals their squares)."""
 DIRECTIONS = ("up", "down", "left", "right")
 
 
@@ -120,72 +120,65 @@ def make_line(settings: LineSettings) -> Task:
     """
     n = settings.n_robots
     n_goals = n if settings.own_goals else 1
-    events = ("out", "stretch", "collision", "goal", "all_goals")[: 5 if settings.own_goals else 4]
-    worth = {
-        "goal": {"goal": settings.goal_reward},
-        **{name: {name: settings.violation_reward} for name in ("stretch", "out", "collision")},
-    }
     agents = ("robots",) if settings.single_agent else tuple(f"robot_{i}" for i in range(n))
     actions: tuple[str, ...] = (*DIRECTIONS, "none")
     if settings.single_agent:
         actions = tuple(f"{name}_{robot}" for robot in range(n) for name in DIRECTIONS)
-    violations = rules.OUT | rules.STRETCH | rules.COLLISION
-    success = rules.ALL_GOALS if settings.own_goals else rules.GOAL
-    largest_square = settings.hose_length**2 // n**2
+    success = ("all_goals",) if settings.own_goals else ("goal",)
+    tables = _make_tables(settings)
+    task = compose_task(
+        partial(
+            rules.Line,
+            n_robots=n,
+            single_agent=settings.single_agent,
+            own_goals=settings.own_goals,
+            cancelling=settings.move_rule == "cancelling",
+            collision=COLLISIONS[settings.collision],
+            half_width=settings.half_width,
+            random_start=settings.start == "random",
+            starts=_read_cells(settings.start, n),
+            goal_mode=GOAL_MODES.get(str(settings.goal), rules.FIXED),
+            goals=_read_cells(settings.goal, n_goals),
+            goal_cells=_list_goal_cells(settings),
+            **tables,
+        ),
+        id="line",
+        agents=agents,
+        action_names=actions,
+        variables=_list_variables(settings, len(tables["offsets"])),
+        events=(*VIOLATIONS, "goal", "all_goals")[: 5 if settings.own_goals else 4],
+        rewards={
+            "goal": {"goal": settings.goal_reward},
+            **{name: {name: settings.violation_reward} for name in ("stretch", "out", "collision")},
+        },
+        schedule="single" if settings.single_agent else "turns",
+        settings=settings,
+        sizes={"robots": 2 * n, "source": 2, "goals": 2 * n_goals},
+        terminal=(*success, *VIOLATIONS) if settings.violations_end else success,
+        violations=VIOLATIONS,
+        success=success,
+        shared=success,
+    )
+    _check_cells_fit(task)
+    return task
+
+
+def _make_tables(settings: LineSettings) -> dict[str, Any]:
+    """Makes the fields of the record that its geometry is looked up in."""
+    largest_square = settings.hose_length**2 // settings.n_robots**2
     offsets = list_offsets(largest_square)
     cover_reach = min(math.isqrt(largest_square), LARGEST_REACH)
     reach = 2 * settings.half_width
     levels = N_SQUARES if settings.own_goals else N_DISTANCES
-    record = rules.Line(
-        n_agents=len(agents),
-        n_actions=len(actions),
-        step_limit=settings.step_limit,
-        terminal=success | (violations if settings.violations_end else 0),
-        violations=violations,
-        success=success,
-        shared=success,
-        reward_table=make_reward_table(events, worth),
-        n_robots=n,
-        single_agent=settings.single_agent,
-        own_goals=settings.own_goals,
-        cancelling=settings.move_rule == "cancelling",
-        collision=COLLISIONS[settings.collision],
-        half_width=settings.half_width,
-        largest_square=largest_square,
-        offsets=offsets,
-        offset_table=make_offset_table(offsets),
-        cover_reach=cover_reach,
-        cover_table=make_cover_table(cover_reach),
-        random_start=settings.start == "random",
-        starts=_read_cells(settings.start, n),
-        goal_mode={"random": rules.RANDOM, "none": rules.ABSENT}.get(
-            str(settings.goal), rules.FIXED
-        ),
-        goals=_read_cells(settings.goal, n_goals),
-        goal_cells=_list_goal_cells(settings),
-        distance_table=make_distance_table(reach, levels, squared=settings.own_goals),
-        direction_table=make_direction_table(reach),
-    )
-    first_goal = HEADER + 2 * n + 2
-    task = Task(
-        id="line",
-        agents=agents,
-        action_names=actions,
-        variables=_list_variables(settings, len(offsets)),
-        rewards=tuple(worth),
-        events=events,
-        schedule="single" if settings.single_agent else "turns",
-        settings=settings,
-        kernel=record,
-        layout={
-            "robots": slice(HEADER, HEADER + 2 * n),
-            "source": slice(HEADER + 2 * n, first_goal),
-            "goals": slice(first_goal, first_goal + 2 * n_goals),
-        },
-        state_size=first_goal + 2 * n_goals,
-    )
-    _check_cells_fit(task)
-    return task
+    return {
+        "largest_square": largest_square,
+        "offsets": offsets,
+        "offset_table": make_offset_table(offsets),
+        "cover_reach": cover_reach,
+        "cover_table": make_cover_table(cover_reach),
+        "distance_table": make_distance_table(reach, levels, squared=settings.own_goals),
+        "direction_table": make_direction_table(reach),
+    }
 
 
 def _read_cells(cells: object, number: int) -> Integers:
@@ -203,7 +196,7 @@ def _list_goal_cells(settings: LineSettings) -> Integers:
 
 
 def _list_variables(settings: LineSettings, n_offsets: int) -> tuple[Variable, ...]:
-    """Lists the variables in the order in which `line_observe.observe_line` writes them."""
+    """Lists the variables in the order in which `kernels.observe_line` writes them."""
     cells = (2 * settings.half_width + 1) ** 2
     own = settings.own_goals
     goal = Variable("goal", cells, "goal's cell, (x + h)(2 h + 1) + y + h", own)
@@ -247,7 +240,7 @@ def _check_cells_fit(task: Task) -> None:
             if rules.is_too_long(record, state, robot):
                 longest = f"segments of at most {settings.hose_length} / {record.n_robots} cells"
                 raise InputError(name, getattr(settings, name), longest)
-            if not line_starts.fits(record, state, robot):
+            if not rules.fits(record, state, robot):
                 free = "cells that no other robot holds and the hose does not cover"
                 raise InputError(name, getattr(settings, name), free)
     if fixed_goal and not record.random_start:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from hose_mj.jit import inlined, jitable
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import HEADER, Floats, Integers, begin, end_joint, end_turn
+from hose_mj.tasks.stream import Stream
 
 COLLISION, MISPLACED, GOAL = 1, 2, 4
 UP, RIGHT, DOWN, LEFT, PICK, DROP = range(6)
@@ -49,7 +50,7 @@ class Taxi(NamedTuple):
 
 @kernels.reset.register(Taxi)
 @inlined
-def reset_taxi(record, state, stream):  # type: ignore[no-untyped-def]
+def reset_taxi(record: Taxi, state: Integers, stream: Stream) -> None:
     """Puts the taxis on their first cells; all passengers wait."""
     begin(state)
     for taxi in range(record.n_taxis):
@@ -58,22 +59,22 @@ def reset_taxi(record, state, stream):  # type: ignore[no-untyped-def]
         state[HEADER + record.n_taxis + passenger] = WAITING
 
 
-@joint.find_target.register(Taxi)
+@joint.compute_target.register(Taxi)
 @jitable
-def find_taxi_target(record, state, taxi, action):  # type: ignore[no-untyped-def]
+def compute_taxi_target(record: Taxi, state: Integers, taxi: int, action: int) -> int:
     """Returns the cell that an action leads to if no wall is in its way."""
     down = (action == DOWN) - (action == UP)
     return state[HEADER + taxi] + WIDTH * down + (action == RIGHT) - (action == LEFT)
 
 
 @jitable
-def is_walled(record, state, taxi, action):  # type: ignore[no-untyped-def]
+def is_walled(record: Taxi, state: Integers, taxi: int, action: int) -> bool:
     """Whether a wall is in the way of an action."""
     return action < PICK and record.walls[state[HEADER + taxi], action] == 1
 
 
 @jitable
-def is_held(record, state, taxi, cell):  # type: ignore[no-untyped-def]
+def is_held(record: Taxi, state: Integers, taxi: int, cell: int) -> bool:
     """Whether another taxi stands on the cell."""
     held = False
     for other in range(record.n_taxis):
@@ -82,15 +83,15 @@ def is_held(record, state, taxi, cell):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def is_blocked(record, state, taxi, action):  # type: ignore[no-untyped-def]
+def is_blocked(record: Taxi, state: Integers, taxi: int, action: int) -> bool:
     """Whether a wall or another taxi is in the way of an action."""
     return is_walled(record, state, taxi, action) or is_held(
-        record, state, taxi, find_taxi_target(record, state, taxi, action)
+        record, state, taxi, compute_taxi_target(record, state, taxi, action)
     )
 
 
 @jitable
-def is_delivered(record, state):  # type: ignore[no-untyped-def]
+def is_delivered(record: Taxi, state: Integers) -> bool:
     """Whether all passengers are where they want to go."""
     for passenger in range(record.origins.shape[0]):
         if state[HEADER + record.n_taxis + passenger] != record.n_taxis + 1:
@@ -99,7 +100,7 @@ def is_delivered(record, state):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def pick(record, state, taxi):  # type: ignore[no-untyped-def]
+def pick(record: Taxi, state: Integers, taxi: int) -> int:
     """Takes in a passenger who waits here, if the taxi is empty; returns the events."""
     waiting = -1
     for passenger in range(record.origins.shape[0]):
@@ -116,7 +117,7 @@ def pick(record, state, taxi):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def drop(record, state, taxi):  # type: ignore[no-untyped-def]
+def drop(record: Taxi, state: Integers, taxi: int) -> int:
     """Lets the taxi's passenger out where he wants to go; returns the events."""
     for passenger in range(record.origins.shape[0]):
         place = HEADER + record.n_taxis + passenger
@@ -128,18 +129,18 @@ def drop(record, state, taxi):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def act(record, state, taxi, action):  # type: ignore[no-untyped-def]
+def act(record: Taxi, state: Integers, taxi: int, action: int) -> int:
     """Carries out an action that nothing prevents and returns the events."""
     if action == PICK:
         return pick(record, state, taxi)
     if action == DROP:
         return drop(record, state, taxi)
-    state[HEADER + taxi] = find_taxi_target(record, state, taxi, action)
+    state[HEADER + taxi] = compute_taxi_target(record, state, taxi, action)
     return 0
 
 
 @jitable
-def act_jointly(record, state, packed):  # type: ignore[no-untyped-def]
+def act_jointly(record: Taxi, state: Integers, packed: int) -> int:
     """Carries out one action of every taxi; returns taxi k's events shifted by 2 k bits."""
     for taxi in range(record.n_taxis):
         if is_walled(record, state, taxi, joint.unpack(packed, taxi)):
@@ -159,7 +160,7 @@ def act_jointly(record, state, packed):  # type: ignore[no-untyped-def]
 
 @kernels.apply.register(Taxi)
 @inlined
-def apply_taxi(record, state, agent, action):  # type: ignore[no-untyped-def]
+def apply_taxi(record: Taxi, state: Integers, agent: int, action: int) -> int:
     """Carries out the action of the agent's taxi, or a single agent's for all taxis."""
     end_turn(record, state, agent)
     if record.single_agent:
@@ -176,25 +177,27 @@ def apply_taxi(record, state, agent, action):  # type: ignore[no-untyped-def]
 
 @kernels.apply_joint.register(Taxi)
 @inlined
-def apply_joint_taxi(record, state, actions, charged):  # type: ignore[no-untyped-def]
+def apply_joint_taxi(
+    record: Taxi, state: Integers, actions: Integers, caused_events: Integers
+) -> int:
     """Carries out the actions of all taxis at once; the goal is charged to agent 0."""
     if record.single_agent:
-        charged[0] = apply_taxi(record, state, 0, actions[0])
-        return charged[0]
+        caused_events[0] = apply_taxi(record, state, 0, actions[0])
+        return caused_events[0]
     act_events = act_jointly(record, state, joint.pack(actions))
     events = 0
     for taxi in range(record.n_taxis):
-        charged[taxi] = act_events >> 2 * taxi & (COLLISION | MISPLACED)
-        events |= charged[taxi]
+        caused_events[taxi] = act_events >> 2 * taxi & (COLLISION | MISPLACED)
+        events |= caused_events[taxi]
     if is_delivered(record, state):
-        charged[0] |= GOAL
+        caused_events[0] |= GOAL
         events |= GOAL
     end_joint(record, state)
     return events
 
 
 @jitable
-def observe_flags(record, state, taxi, values, at):  # type: ignore[no-untyped-def]
+def observe_flags(record: Taxi, state: Integers, taxi: int, values: Integers, at: int) -> None:
     """Writes whether something is in a taxi's way up, down, left and right, from `at` on."""
     values[at] = is_blocked(record, state, taxi, UP)
     values[at + 1] = is_blocked(record, state, taxi, DOWN)
@@ -204,7 +207,7 @@ def observe_flags(record, state, taxi, values, at):  # type: ignore[no-untyped-d
 
 @kernels.observe.register(Taxi)
 @inlined
-def observe_taxi(record, state, agent, values):  # type: ignore[no-untyped-def]
+def observe_taxi(record: Taxi, state: Integers, agent: int, values: Integers) -> None:
     """Writes the taxis' cells, the passengers, and the flags of the agent's taxi or of each."""
     at = record.n_taxis + record.origins.shape[0]
     for k in range(at):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.checks import check_cells, check_choice, check_finite, check_integer
-from hose_mj.tasks.kernels import HEADER, Integers
-from hose_mj.tasks.task import Task, make_reward_table
+from hose_mj.tasks.kernels import Integers
+from hose_mj.tasks.task import Task, compose_task
 from hose_mj.tasks.taxi import kernels as rules
 from hose_mj.tasks.variables import Variable
 
@@ -73,49 +74,45 @@ class TaxiSettings:
 def make_taxi(settings: TaxiSettings) -> Task:
     """Makes the taxi task."""
     n, single = len(settings.starts), settings.single_agent
-    kinds = [f"_{taxi}" for taxi in range(n)] if single else [""]
-    events = (*(f"{name}{k}" for k in kinds for name in ("collision", "misplaced")), "goal")
-    worth = {
-        "goal": {"goal": settings.goal_reward},
-        "collision": {f"collision{k}": settings.collision_reward for k in kinds},
-        "misplaced": {f"misplaced{k}": settings.misplaced_reward for k in kinds},
-    }
-    agents = ("taxis",) if single else tuple(f"taxi_{taxi}" for taxi in range(n))
+    tails = [f"_{taxi}" for taxi in range(n)] if single else [""]
+    collisions = tuple(f"collision{tail}" for tail in tails)
     actions: tuple[str, ...] = ACTIONS
     if single:
         choices = product(ACTIONS, repeat=n)
         actions = tuple("+".join(f"{name}_{k}" for k, name in enumerate(c)) for c in choices)
-    goal = 1 << len(events) - 1
     places = {name: rules.WIDTH * row + column for name, (row, column) in STATIONS.items()}
-    record = rules.Taxi(
-        n_agents=len(agents),
-        n_actions=len(actions),
-        step_limit=settings.step_limit,
-        terminal=goal,
-        violations=sum(rules.COLLISION << 2 * k for k in range(len(kinds))),
-        success=goal,
-        shared=goal,
-        reward_table=make_reward_table(events, worth),
-        n_taxis=n,
-        single_agent=single,
-        walls=_make_walls(),
-        starts=np.array([rules.WIDTH * row + column for row, column in settings.starts], np.int64),
-        origins=np.array([places[a] for a, _ in settings.passengers], np.int64),
-        destinations=np.array([places[b] for _, b in settings.passengers], np.int64),
-    )
-    end = HEADER + n + len(settings.passengers)
-    return Task(
+    return compose_task(
+        partial(
+            rules.Taxi,
+            n_taxis=n,
+            single_agent=single,
+            walls=_make_walls(),
+            starts=np.array(
+                [rules.WIDTH * row + column for row, column in settings.starts], np.int64
+            ),
+            origins=np.array([places[a] for a, _ in settings.passengers], np.int64),
+            destinations=np.array([places[b] for _, b in settings.passengers], np.int64),
+        ),
         id="taxi",
-        agents=agents,
+        agents=("taxis",) if single else tuple(f"taxi_{taxi}" for taxi in range(n)),
         action_names=actions,
         variables=_list_variables(settings),
-        rewards=tuple(worth),
-        events=events,
+        events=(
+            *(f"{name}{tail}" for tail in tails for name in ("collision", "misplaced")),
+            "goal",
+        ),
+        rewards={
+            "goal": {"goal": settings.goal_reward},
+            "collision": dict.fromkeys(collisions, settings.collision_reward),
+            "misplaced": {f"misplaced{tail}": settings.misplaced_reward for tail in tails},
+        },
         schedule="single" if single else "turns",
         settings=settings,
-        kernel=record,
-        layout={"taxis": slice(HEADER, HEADER + n), "passengers": slice(HEADER + n, end)},
-        state_size=end,
+        sizes={"taxis": n, "passengers": len(settings.passengers)},
+        terminal=("goal",),
+        violations=collisions,
+        success=("goal",),
+        shared=("goal",),
     )
 
 
@@ -129,7 +126,7 @@ def _make_walls() -> Integers:
 
 
 def _list_variables(settings: TaxiSettings) -> tuple[Variable, ...]:
-    """Lists the variables in the order in which `taxi_kernels.observe_taxi` writes them."""
+    """Lists the variables in the order in which `kernels.observe_taxi` writes them."""
     n = len(settings.starts)
     meaning = f"waiting (0), in taxi k (k + 1), delivered ({n + 1})"
     taxis = [Variable(f"taxi_{k}", rules.WIDTH**2, f"cell of taxi {k}") for k in range(n)]

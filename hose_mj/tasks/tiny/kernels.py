@@ -7,7 +7,7 @@ from typing import NamedTuple
 from hose_mj.jit import inlined, jitable
 from hose_mj.tasks import joint, kernels
 from hose_mj.tasks.kernels import HEADER, TURN, Floats, Integers, begin, end_joint, end_turn
-from hose_mj.tasks.stream import draw_below
+from hose_mj.tasks.stream import Stream, draw_below
 
 COLLISION, GOAL, DONE = 1, 2, 4
 LEFT, RIGHT = 0, 1
@@ -41,22 +41,22 @@ class Corridor(NamedTuple):
 
 @kernels.reset.register(Corridor)
 @inlined
-def reset_corridor(record, state, stream):  # type: ignore[no-untyped-def]
+def reset_corridor(record: Corridor, state: Integers, stream: Stream) -> None:
     """Puts the robots on their first cells."""
     begin(state)
     for robot in range(record.n_agents):
         state[HEADER + robot] = record.starts[robot]
 
 
-@joint.find_target.register(Corridor)
+@joint.compute_target.register(Corridor)
 @jitable
-def find_corridor_target(record, state, robot, action):  # type: ignore[no-untyped-def]
+def compute_corridor_target(record: Corridor, state: Integers, robot: int, action: int) -> int:
     """Returns the cell an action leads to; -1 and n_cells are walls."""
     return state[HEADER + robot] + (action == RIGHT) - (action == LEFT)
 
 
 @jitable
-def is_goal_held(record, state):  # type: ignore[no-untyped-def]
+def is_goal_held(record: Corridor, state: Integers) -> bool:
     """Whether a robot stands on the goal."""
     held = False
     for robot in range(record.n_agents):
@@ -66,10 +66,10 @@ def is_goal_held(record, state):  # type: ignore[no-untyped-def]
 
 @kernels.apply.register(Corridor)
 @inlined
-def apply_corridor(record, state, agent, action):  # type: ignore[no-untyped-def]
+def apply_corridor(record: Corridor, state: Integers, agent: int, action: int) -> int:
     """Moves one robot; a wall or the other robot stops it."""
     here = state[HEADER + agent]
-    target = find_corridor_target(record, state, agent, action)
+    target = compute_corridor_target(record, state, agent, action)
     events = 0
     if target != here:
         free = 0 <= target < record.n_cells
@@ -86,24 +86,26 @@ def apply_corridor(record, state, agent, action):  # type: ignore[no-untyped-def
 
 @kernels.apply_joint.register(Corridor)
 @inlined
-def apply_joint_corridor(record, state, actions, charged):  # type: ignore[no-untyped-def]
+def apply_joint_corridor(
+    record: Corridor, state: Integers, actions: Integers, caused_events: Integers
+) -> int:
     """Moves both robots at once; a wall, or the other robot, stops one."""
     packed = joint.pack(actions)
     for robot in range(record.n_agents):
-        if not 0 <= find_corridor_target(record, state, robot, actions[robot]) < record.n_cells:
+        if not 0 <= compute_corridor_target(record, state, robot, actions[robot]) < record.n_cells:
             packed = joint.cancel(packed, robot)
     packed = joint.settle(record, state, record.n_agents, packed, record.winner)
     events = 0
     for robot in range(record.n_agents):
         action = joint.unpack(packed, robot)
-        target = find_corridor_target(record, state, robot, action)
+        target = compute_corridor_target(record, state, robot, action)
         entered = target != state[HEADER + robot]
         state[HEADER + robot] = target
-        charged[robot] = COLLISION * (action == joint.CANCELLED)
-        charged[robot] |= GOAL * (entered and target == record.goal)
-        events |= charged[robot]
+        caused_events[robot] = COLLISION * (action == joint.CANCELLED)
+        caused_events[robot] |= GOAL * (entered and target == record.goal)
+        events |= caused_events[robot]
     if is_goal_held(record, state):
-        charged[0] |= DONE
+        caused_events[0] |= DONE
         events |= DONE
     end_joint(record, state)
     return events
@@ -111,7 +113,7 @@ def apply_joint_corridor(record, state, actions, charged):  # type: ignore[no-un
 
 @kernels.observe.register(Corridor)
 @inlined
-def observe_corridor(record, state, agent, values):  # type: ignore[no-untyped-def]
+def observe_corridor(record: Corridor, state: Integers, agent: int, values: Integers) -> None:
     """Writes the robots' cells, which both agents see."""
     for robot in range(record.n_agents):
         values[robot] = state[HEADER + robot]
@@ -147,7 +149,7 @@ class Maze(NamedTuple):
 
 @kernels.reset.register(Maze)
 @inlined
-def reset_maze(record, state, stream):  # type: ignore[no-untyped-def]
+def reset_maze(record: Maze, state: Integers, stream: Stream) -> None:
     """Puts the robot on its first cell, or on any but the goal's."""
     begin(state)
     if record.start_x < 0:
@@ -162,7 +164,7 @@ def reset_maze(record, state, stream):  # type: ignore[no-untyped-def]
 
 @kernels.apply.register(Maze)
 @inlined
-def apply_maze(record, state, agent, action):  # type: ignore[no-untyped-def]
+def apply_maze(record: Maze, state: Integers, agent: int, action: int) -> int:
     """Moves the robot up, down, left or right; a wall stops it."""
     end_turn(record, state, agent)
     x, y = state[HEADER], state[HEADER + 1]
@@ -176,15 +178,17 @@ def apply_maze(record, state, agent, action):  # type: ignore[no-untyped-def]
 
 @kernels.apply_joint.register(Maze)
 @inlined
-def apply_joint_maze(record, state, actions, charged):  # type: ignore[no-untyped-def]
+def apply_joint_maze(
+    record: Maze, state: Integers, actions: Integers, caused_events: Integers
+) -> int:
     """Moves the robot; there is only one."""
-    charged[0] = apply_maze(record, state, 0, actions[0])
-    return charged[0]
+    caused_events[0] = apply_maze(record, state, 0, actions[0])
+    return caused_events[0]
 
 
 @kernels.observe.register(Maze)
 @inlined
-def observe_maze(record, state, agent, values):  # type: ignore[no-untyped-def]
+def observe_maze(record: Maze, state: Integers, agent: int, values: Integers) -> None:
     """Writes x, y and for each action whether a wall is in its way."""
     values[0], values[1] = state[HEADER], state[HEADER + 1]
     for action in range(record.n_actions):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -10,9 +11,8 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.tasks import joint
 from hose_mj.tasks.checks import check_cell, check_choice, check_finite, check_integer
-from hose_mj.tasks.kernels import HEADER
-from hose_mj.tasks.task import Task, make_reward_table
-from hose_mj.tasks.tiny.kernels import COLLISION, DONE, GOAL, Corridor, Maze
+from hose_mj.tasks.task import Task, compose_task
+from hose_mj.tasks.tiny.kernels import Corridor, Maze
 from hose_mj.tasks.variables import Variable
 
 DIRECTIONS = ("up", "down", "left", "right")
@@ -62,41 +62,37 @@ class CorridorSettings:
 
 def make_corridor(settings: CorridorSettings) -> Task:
     """Makes the corridor."""
-    events = ("collision", "goal", "done")
-    worth = {
-        "goal": {"goal": settings.goal_reward},
-        "collision": {"collision": settings.collision_reward},
-    }
-    record = Corridor(
-        n_agents=2,
-        n_actions=3,
-        step_limit=settings.step_limit,
-        terminal=DONE,
-        violations=COLLISION,
-        success=DONE,
-        shared=COLLISION | GOAL | DONE,
-        reward_table=make_reward_table(events, worth),
-        n_cells=settings.n_cells,
-        goal=settings.goal,
-        starts=np.array(settings.starts, np.int64),
-        goal_ends_move=settings.goal_ends == "move",
-        winner=WINNERS[settings.winner],
-    )
-    return Task(
+    return compose_task(
+        partial(
+            Corridor,
+            n_cells=settings.n_cells,
+            goal=settings.goal,
+            starts=np.array(settings.starts, np.int64),
+            goal_ends_move=settings.goal_ends == "move",
+            winner=WINNERS[settings.winner],
+        ),
         id="corridor",
         agents=("robot_0", "robot_1"),
         action_names=("left", "right", "none"),
         variables=tuple(
             Variable(f"p_{robot}", settings.n_cells, f"cell of robot {robot}") for robot in (0, 1)
         ),
-        rewards=tuple(worth),
-        events=events,
-        schedule="turns",
+        events=("collision", "goal", "done"),
+        rewards=_make_rewards(settings),
         settings=settings,
-        kernel=record,
-        layout={"robots": slice(HEADER, HEADER + 2)},
-        state_size=HEADER + 2,
+        sizes={"robots": 2},
+        terminal=("done",),
+        violations=("collision",),
+        success=("done",),
+        shared=("collision", "goal", "done"),
     )
+
+
+def _make_rewards(settings: CorridorSettings | MazeSettings) -> dict[str, dict[str, float]]:
+    return {
+        "goal": {"goal": settings.goal_reward},
+        "collision": {"collision": settings.collision_reward},
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,32 +136,20 @@ MAZE_WALLS_ABOVE = ((0, 0), (2, 0))
 
 def make_maze(settings: MazeSettings) -> Task:
     """Makes the maze."""
-    events = ("collision", "goal")
-    worth = {
-        "goal": {"goal": settings.goal_reward},
-        "collision": {"collision": settings.collision_reward},
-    }
     actions = DIRECTIONS if settings.actions == "all" else ("up",)
     width, height = MAZE_SHAPE
     start = (-1, -1) if settings.start == "random" else settings.start
-    record = Maze(
-        n_agents=1,
-        n_actions=len(actions),
-        step_limit=settings.step_limit,
-        terminal=GOAL,
-        violations=COLLISION,
-        success=GOAL,
-        shared=0,
-        reward_table=make_reward_table(events, worth),
-        width=width,
-        height=height,
-        goal_x=settings.goal[0],
-        goal_y=settings.goal[1],
-        start_x=start[0],
-        start_y=start[1],
-        walls=_make_walls(),
-    )
-    return Task(
+    return compose_task(
+        partial(
+            Maze,
+            width=width,
+            height=height,
+            goal_x=settings.goal[0],
+            goal_y=settings.goal[1],
+            start_x=start[0],
+            start_y=start[1],
+            walls=_make_walls(),
+        ),
         id="maze",
         agents=("robot_0",),
         action_names=actions,
@@ -174,13 +158,15 @@ def make_maze(settings: MazeSettings) -> Task:
             Variable("y", height, "row, counted upwards"),
             *(Variable(f"o_{name}", 2, f"1 when a wall is {name}", True) for name in actions),
         ),
-        rewards=tuple(worth),
-        events=events,
+        events=("collision", "goal"),
+        rewards=_make_rewards(settings),
         schedule="single",
         settings=settings,
-        kernel=record,
-        layout={"robots": slice(HEADER, HEADER + 2)},
-        state_size=HEADER + 2,
+        sizes={"robots": 2},
+        terminal=("goal",),
+        violations=("collision",),
+        success=("goal",),
+        shared=(),
     )
 
 

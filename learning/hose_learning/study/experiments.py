@@ -11,8 +11,8 @@ import numpy as np
 from hose_learning.study.jobs import Job, Result
 from hose_learning.study.statistics import compute_mean_interval, compute_rate_interval
 from hose_mj.checks import Check
+from hose_mj.tasks.exact import find_shortest
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.search import find_shortest
 from hose_mj.tasks.stream import make_stream
 
 Runs = Mapping[str, list[Result]]

@@ -8,8 +8,8 @@ from hose_learning.study.experiments import (
 )
 from hose_learning.study.jobs import make_training
 
+from hose_mj.tasks.exact import find_shortest
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.search import find_shortest
 from hose_mj.tasks.stream import make_stream
 
 SEEDS = range(10)

@@ -9,7 +9,7 @@ from functools import lru_cache
 from itertools import pairwise, product
 
 from hose_mj.tasks.line.settings import Cell, LineSettings
-from reference_tasks.twin import Twin, TwinStream
+from reference_tasks.reference import Reference, ReferenceStream
 
 HALF = Fraction(1, 2)
 STEPS = {"up": (0, 1), "down": (0, -1), "left": (-1, 0), "right": (1, 0), "none": (0, 0)}
@@ -33,7 +33,7 @@ def covers(a: Cell, b: Cell, cell: Cell) -> bool:
     return first < last and first < 1 and last > 0
 
 
-class LineTwin(Twin):
+class LineReference(Reference):
     """The task's state and rules.
 
     Attributes:
@@ -258,7 +258,7 @@ class LineTwin(Twin):
 
     # Initial states
 
-    def draw_chain(self, stream: TwinStream) -> list[Cell]:
+    def draw_chain(self, stream: ReferenceStream) -> list[Cell]:
         """Draws robots' cells, from the source outwards, anew at the first that does not fit."""
         while True:
             self.robots = []
@@ -278,7 +278,7 @@ class LineTwin(Twin):
             for robot, cell in enumerate(self.robots)
         )
 
-    def reset(self, stream: TwinStream) -> None:
+    def reset(self, stream: ReferenceStream) -> None:
         """Draws goals and robots until the task is not solved at the start."""
         self.begin()
         goal, start = self.settings.goal, self.settings.start

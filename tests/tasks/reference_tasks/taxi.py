@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hose_mj.tasks.taxi.settings import ACTIONS, Cell, TaxiSettings
-from reference_tasks.twin import Twin, TwinStream
+from reference_tasks.reference import Reference, ReferenceStream
 
 MAP = (
     "R .|. . G",
@@ -34,7 +34,7 @@ def is_walled(cell: Cell, action: str) -> bool:
     return not 0 <= beside < len(MAP[row]) or MAP[row][beside] == "|"
 
 
-class TaxiTwin(Twin):
+class TaxiReference(Reference):
     """The task's state and rules.
 
     Attributes:
@@ -57,7 +57,7 @@ class TaxiTwin(Twin):
             numbers[place] for place in self.passengers
         ]
 
-    def reset(self, stream: TwinStream) -> None:
+    def reset(self, stream: ReferenceStream) -> None:
         """Puts everything to its beginning."""
         self.begin()
         self.taxis = list(self.settings.starts)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hose_mj.tasks.tiny.settings import CorridorSettings, MazeSettings
-from reference_tasks.twin import Twin, TwinStream
+from reference_tasks.reference import Reference, ReferenceStream
 
 CORRIDOR_STEPS = (-1, 1, 0)
 MAZE_STEPS = {"up": (0, 1), "down": (0, -1), "left": (-1, 0), "right": (1, 0)}
 
 
-class CorridorTwin(Twin):
+class CorridorReference(Reference):
     """The corridor's state and rules.
 
     Attributes:
@@ -28,7 +28,7 @@ class CorridorTwin(Twin):
         """Lists the robots' cells."""
         return self.robots
 
-    def reset(self, stream: TwinStream) -> None:
+    def reset(self, stream: ReferenceStream) -> None:
         """Puts the robots on their first cells."""
         self.begin()
         self.robots = list(self.settings.starts)
@@ -83,7 +83,7 @@ class CorridorTwin(Twin):
         return {f"p_{robot}": cell for robot, cell in enumerate(self.robots)}
 
 
-class MazeTwin(Twin):
+class MazeReference(Reference):
     """The maze's state and rules.
 
     Attributes:
@@ -101,7 +101,7 @@ class MazeTwin(Twin):
         """Lists x and y."""
         return self.at
 
-    def reset(self, stream: TwinStream) -> None:
+    def reset(self, stream: ReferenceStream) -> None:
         """Puts the robot on its first cell."""
         self.begin()
         cells = [(x, y) for y in (0, 1) for x in range(4) if (x, y) != self.settings.goal]

@@ -1,4 +1,4 @@
-"""What all twins have: random numbers in Python's integers, turns, and the state as an array."""
+"""What all references have: Python's integers as random numbers, turns, the state as an array."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hose_mj.tasks.kernels import Integers
 _MASK = 2**64 - 1
 
 
-class TwinStream:
+class ReferenceStream:
     """splitmix64 (Steele, Lea and Flood 2014) and Lemire's bounded integers (2019).
 
     Args:
@@ -37,7 +37,7 @@ class TwinStream:
                 return whole
 
 
-class Twin:
+class Reference:
     """Turns and steps, and the state as the kernels hold it."""
 
     n_agents: int

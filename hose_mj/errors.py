@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class HoseError(Exception):
     """Base of every error that hose_mj raises on purpose."""
@@ -19,6 +21,17 @@ class InputError(HoseError, ValueError):
     def __init__(self, thing: str, value: object, valid: str) -> None:
         self.thing, self.value, self.valid = thing, value, valid
         super().__init__(f"{thing} is {value!r}; valid: {valid}")
+
+    @classmethod
+    def about(cls, sentence: str) -> Self:
+        """Returns the error of an act that cannot be done now; the message is that sentence.
+
+        ``InputError.about("cannot open a hose that is not closed")``: its subject is no value, so
+        `thing`, `value` and `valid` are empty.
+        """
+        error = cls("", None, "")
+        error.args = (sentence,)
+        return error
 
 
 class StepError(HoseError, RuntimeError):

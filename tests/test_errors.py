@@ -6,7 +6,8 @@ from hose_mj.errors import HoseError, InputError
 def test_a_value_is_refused_with_its_name_and_the_valid_set():
     error = InputError("length", -1.0, "a number above 0 (m)")
     assert str(error) == "length is -1.0; valid: a number above 0 (m)"
-    assert isinstance(error, HoseError) and isinstance(error, ValueError)
+    assert isinstance(error, HoseError)
+    assert isinstance(error, ValueError)
 
 
 def test_an_act_is_refused_with_one_sentence():

@@ -47,7 +47,7 @@ class SplineBody:
         uniform = spline.from_world(np.tile(self.gravity, (spline.n_control_points, 1)))
         self._weight = self._multiply_mass(uniform)
         self._state = integrators.make_state(spline.size)
-        self._constraints = ConstraintSet(spline, self._hose)
+        self._constraints = ConstraintSet(spline, self._hose, self._state.x)
         self._span = make_span()
         self._strains = np.zeros((spline.n_control_points - 3, 2))
 

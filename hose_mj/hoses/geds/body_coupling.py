@@ -1,4 +1,4 @@
-"""`Dynamics`, one hose's steps, and `BodyCoupling`, its steps with bodies that feel it.
+"""`BodyCoupling`: steps of a hose with bodies that feel it, `hose.coupling`.
 
 A body answers a mean force F on the hose over a step by where it is at the end: after - compliance
 F. With that the constraints' rows of Newton's matrix get a diagonal block of their own, and the
@@ -8,74 +8,19 @@ step finds F such that hose and body meet, however light the body and stiff the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.geds import integrators, records
-from hose_mj.hoses.geds.constraints import ConstraintSet
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import integrators
+from hose_mj.hoses.geds.dynamics import Dynamics
 from hose_mj.hoses.geds.integrators import STEPS
-from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.point_masses import NEAR, PointMasses, advance_with_masses
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.jit import run_kernel
-
-
-@dataclass
-class Dynamics:
-    """One hose as the integrators take it, and its clock.
-
-    Attributes:
-        axes: a zero for each unknown of a control point.
-        hose: constants.
-        constraints, loads: what acts on it.
-        limits: when Newton's iteration stops.
-        scheme: the integrator's name.
-        timestep: length of a step (s).
-        state: what a step changes.
-        counts: steps since the last reset, Newton iterations and fallbacks so far, (3,).
-    """
-
-    axes: tuple[float, ...]
-    hose: records.Hose
-    constraints: ConstraintSet
-    loads: LoadSet
-    limits: records.Limits
-    scheme: str
-    timestep: float
-    state: integrators.State
-    counts: np.ndarray
-
-    @property
-    def time(self) -> float:
-        """Simulated time since the last reset (s)."""
-        return int(self.counts[STEPS]) * self.timestep
-
-    def run(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Calls a kernel with what all integrators read and these arguments; returns its answer."""
-        return run_kernel(
-            *(kernel, self.axes, self.hose, self.constraints.rows, self.loads.loads, self.limits),
-            *arguments,
-        )
-
-    def advance(self, n_steps: int) -> None:
-        """Takes n_steps steps; raises `StepError` for one that no fallback finished."""
-        code = integrators.SCHEMES[self.scheme]
-        arguments = (code, self.timestep, n_steps, self.state, self.counts)
-        self.check(self.run(integrators.advance, *arguments))
-
-    def check(self, verdict: int) -> None:
-        """Raises `StepError` unless a step was done."""
-        if verdict != records.DONE:
-            raise StepError(
-                f"the step at t = {self.time:.6g} s failed: {records.VERDICTS[verdict]}; "
-                f"try a time step below {self.timestep:g} s or check holds and loads"
-            )
 
 
 class BodyCoupling:

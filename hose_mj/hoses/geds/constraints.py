@@ -51,21 +51,22 @@ class ConstraintSet:
     Args:
         spline: the hose's geometry.
         hose: its constants.
+        x: its unknowns, read whenever something changes.
 
     Attributes:
         rows: what the kernels read and write; made anew by every change.
         is_closed: whether the hose is a closed loop.
     """
 
-    def __init__(self, spline: Spline, hose: records.Hose) -> None:
+    def __init__(self, spline: Spline, hose: records.Hose, x: Array) -> None:
         self._spline, self._hose = spline, hose
         self.is_closed = False
         self._held: list[_Held] = []
         self._compliant: list[Hold] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
         self._n_made = 0
-        x = np.zeros(spline.size)
-        self.rows = self._make_rows_of_all(x, twist_segments.make_twist(spline, hose, [], x))
+        self._x = x
+        self.rows = self._make_rows(twist_segments.make_twist(spline, hose, [], x))
 
     @property
     def n_rows(self) -> int:
@@ -81,33 +82,29 @@ class ConstraintSet:
         """All holds, the oldest first."""
         return [held.hold for held in self._held]
 
-    def clear(self, x: Array, director: Array | None = None) -> None:
+    def clear(self, director: Array | None = None) -> None:
         """Drops all holds and opens a loop; numbers are not used again. The frames begin anew.
 
         Args:
-            x: the unknowns.
             director: of the material where the hose begins, (3,); any by default.
         """
         self._held, self._clamps, self.is_closed = [], [], False
-        twist = twist_segments.make_twist(self._spline, self._hose, [], x)
+        twist = twist_segments.make_twist(self._spline, self._hose, [], self._x)
         if self._spline.has_theta:
-            start = twist_segments.make_directors(self._spline, np.zeros(1), x)[0]
+            start = twist_segments.make_directors(self._spline, np.zeros(1), self._x)[0]
             twist.frames[0, 6:9] = start[3:] if director is None else director
             axes, tables = self._spline.axes, self._hose.tables
-            run_kernel(transport_frames, axes, tables, twist, x, make_span(), twist.frames)
+            run_kernel(transport_frames, axes, tables, twist, self._x, make_span(), twist.frames)
             twist.accepted[:] = twist.frames
-        self.rows = self._make_rows_of_all(x, twist)
+        self.rows = self._make_rows(twist)
 
-    def add(
-        self, arc_length: float, position: ArrayLike | None, tangent: Array | None, x: Array
-    ) -> Hold:
+    def add(self, arc_length: float, position: ArrayLike | None, tangent: Array | None) -> Hold:
         """Adds a hold.
 
         Args:
             arc_length: where on the hose (m).
             position: wanted place (3,) m; None for where the hose is now.
             tangent: wanted unit tangent (3,) of a clamp; None for an attachment.
-            x: the hose's unknowns.
 
         Raises:
             InputError: a place off the hose or that another hold is at, a position off its plane, a
@@ -122,18 +119,18 @@ class ConstraintSet:
             if apart < 1e-9 * spline.length:
                 raise InputError("arc_length", s, "a place that no other hold is at")
         if position is None:
-            point = spline.evaluate(np.array([s]), x)[0] + spline.offset
+            point = spline.evaluate(np.array([s]), self._x)[0] + spline.offset
         else:
             point = spline.check_position(position)
         if tangent is not None:
-            _check_ahead(tangent, spline.evaluate(np.array([s]), x, 1)[0])
+            _check_ahead(tangent, spline.evaluate(np.array([s]), self._x, 1)[0])
         hold = Hold(self._n_made, s, tangent is not None)
         n_rows = spline.dimension
         if tangent is not None:
             n_rows += spline.dimension - 1 + spline.has_theta
         self._n_made += 1
         self._held.append(_Held(hold, point, tangent, np.zeros(n_rows)))
-        self._rebuild(x)
+        self._rebuild()
         return hold
 
     def move(
@@ -142,7 +139,6 @@ class ConstraintSet:
         position: ArrayLike | None,
         tangent: ArrayLike | None,
         spin: float,
-        x: Array,
     ) -> None:
         """Sets where a hold is to be at the end of the next step; see `HoseModel.move`.
 
@@ -163,9 +159,9 @@ class ConstraintSet:
             _check_ahead(aim, held.tangent)
         held.position, held.tangent = point, aim
         if tangent is None:
-            self._aim(held, x)
+            self._aim(held)
         else:
-            self._rebuild(x)
+            self._rebuild()
         if spin != 0.0:
             self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
 
@@ -187,14 +183,14 @@ class ConstraintSet:
             raise InputError("director", vector.tolist(), "a vector across the tangent")
         return np.asarray(across / length)
 
-    def turn_to(self, hold: Hold, director: Array, x: Array) -> None:
+    def turn_to(self, hold: Hold, director: Array) -> None:
         """Lets the material at a clamp turn to a director within the next step."""
         held = self._find(hold)
         clamp, twist = self._clamps.index(hold.number), self.rows.twist
         assert held.tangent is not None
         if self._spline.has_theta:
             row = 3 * len(self._hose.tables.first) + clamp
-            theta = float(self._spline.evaluate_theta(np.array([hold.arc_length]), x)[0])
+            theta = float(self._spline.evaluate_theta(np.array([hold.arc_length]), self._x)[0])
             tangent, base = twist.accepted[row, :3], twist.accepted[row, 6:9]
             now = np.cos(theta) * base + np.sin(theta) * np.cross(tangent, base)
         else:
@@ -259,12 +255,12 @@ class ConstraintSet:
         places = np.array([hold.arc_length for hold in self._compliant])
         return self._spline.evaluate(places, x) + self._spline.offset
 
-    def release(self, hold: Hold, x: Array) -> None:
+    def release(self, hold: Hold) -> None:
         """Drops one hold; raises `InputError` for one that is not here."""
         self._held.remove(self._find(hold))
-        self._rebuild(x)
+        self._rebuild()
 
-    def close(self, spin: float, x: Array) -> None:
+    def close(self, spin: float) -> None:
         """Joins s = L to s = 0, its material turned by `spin` (rad) about the tangent before.
 
         Raises:
@@ -276,18 +272,18 @@ class ConstraintSet:
             raise InputError("spin", spin, "0 for a hose in a plane")
         if self.is_closed:
             raise InputError.about("cannot close a hose that is closed: open it first")
-        loops.check_ends(self._spline, [one.hold.arc_length for one in self._held], x)
+        loops.check_ends(self._spline, [one.hold.arc_length for one in self._held], self._x)
         self.is_closed = True
-        self._rebuild(x, spin)
+        self._rebuild(spin=spin)
 
-    def open(self, x: Array) -> None:
+    def open(self) -> None:
         """Parts the ends of a closed loop; raises `InputError` for a hose that is open."""
         if not self.is_closed:
             raise InputError.about("cannot open a hose that is not closed")
         self.is_closed = False
-        self._rebuild(x)
+        self._rebuild()
 
-    def reaction(self, hold: Hold, x: Array) -> Reaction:
+    def reaction(self, hold: Hold) -> Reaction:
         """Force and moment of a hold on the hose at the end of the last step, world frame."""
         held = self._find(hold)
         d = self._spline.dimension
@@ -296,7 +292,7 @@ class ConstraintSet:
         moment = np.zeros(3)
         if held.tangent is not None:
             # A force f on r' works like the moment r' x f.
-            slope = self._spline.evaluate(np.array([hold.arc_length]), x, 1)[0]
+            slope = self._spline.evaluate(np.array([hold.arc_length]), self._x, 1)[0]
             across = held.multipliers[d : 2 * d - 1] @ self._across(held.tangent)
             moment = np.cross(slope, across) + self._compute_torque(held) * held.tangent
         return Reaction(force, moment)
@@ -338,8 +334,8 @@ class ConstraintSet:
             "mean_force": self.rows.response.force.copy(),
         }
 
-    def restore(self, state: dict[str, Any], x: Array) -> None:
-        """Returns to a snapshot; x are the control points of the same moment."""
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot."""
         self._held = [
             _Held(
                 Hold(one["number"], one["arc_length"], one["tangent"] is not None),
@@ -351,7 +347,7 @@ class ConstraintSet:
         ]
         self._n_made = max(self._n_made, state["n_made"])
         self.is_closed = state["is_closed"]
-        self._rebuild(x)
+        self._rebuild()
         self.rows.before[:] = state["before"]
         for name in _REMEMBERED:
             getattr(self.rows.twist, name)[:] = state["twist"][name]
@@ -376,7 +372,7 @@ class ConstraintSet:
         first = twist_segments.compute_normal(tangent)
         return np.stack([first, np.cross(tangent, first)])
 
-    def _rebuild(self, x: Array, spin: float = 0.0) -> None:
+    def _rebuild(self, spin: float = 0.0) -> None:
         """Makes everything anew from the list of holds; the material stays as it lies.
 
         `spin`: what the last end of a loop is turned by (rad).
@@ -391,23 +387,23 @@ class ConstraintSet:
             numbers = [_FIRST_END, *numbers, _LAST_END]
             places = [0.0, *places, self._spline.length]
         if self._spline.dimension == 2 or numbers == self._clamps:
-            self.rows = self._make_rows_of_all(x, self.rows.twist)
+            self.rows = self._make_rows(self.rows.twist)
             return
         same = {k: self._clamps.index(n) for k, n in enumerate(numbers) if n in self._clamps}
-        twist = twist_segments.make_twist(self._spline, self._hose, places, x)
+        twist = twist_segments.make_twist(self._spline, self._hose, places, self._x)
         if self._spline.has_theta:
             n_spans = len(self._hose.tables.first)
             twist_segments.take_over_frames(twist, self.rows.twist, same, n_spans)
         else:
-            old = twist_segments.part_ends(self._spline, self._hose, self.rows.twist, x)
-            twist_segments.take_over_twist(self._spline, self._hose, twist, old, same, x)
+            old = twist_segments.part_ends(self._spline, self._hose, self.rows.twist, self._x)
+            twist_segments.take_over_twist(self._spline, self._hose, twist, old, same, self._x)
             if self.is_closed:
                 twist = twist_segments.join_ends(twist, spin)
             twist_segments.settle(twist)
         self._clamps = numbers
-        self.rows = self._make_rows_of_all(x, twist)
+        self.rows = self._make_rows(twist)
 
-    def _make_rows_of_all(self, x: Array, twist: Twist) -> records.Constraints:
+    def _make_rows(self, twist: Twist) -> records.Constraints:
         """Makes the rows of G x = g: positions first, then slopes across, then theta.
 
         `before` is what x meets now, so a hold that was moved goes its way within the next step
@@ -423,8 +419,8 @@ class ConstraintSet:
             own = slice(first, first + len(held.multipliers))
             places, values = self._spline.compute_basis(np.array([held.hold.arc_length]))
             start[own] = places[0]
-            coefficients[own, :width] = self._make_rows(held, values[0])
-            before[own] = coefficients[own, :width] @ x[places[0] : places[0] + width]
+            coefficients[own, :width] = self._make_own_rows(held, values[0])
+            before[own] = coefficients[own, :width] @ self._x[places[0] : places[0] + width]
             after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
             if held.tangent is not None and self._spline.has_theta:
                 after[own.stop - 1] = before[own.stop - 1]
@@ -435,22 +431,22 @@ class ConstraintSet:
             first = own.stop
         if self.is_closed:
             coefficients[first:] = loops.make_joint_rows(self._spline)
-            before[first:] = coefficients[first:, :width] @ x[:width]
-            before[first:] += coefficients[first:, width:] @ x[-width:]
+            before[first:] = coefficients[first:, :width] @ self._x[:width]
+            before[first:] += coefficients[first:, width:] @ self._x[-width:]
         self._compliant = []
         response = records.make_response(0)
         return records.Constraints(start, coefficients, before, after, multipliers, twist, response)
 
-    def _aim(self, held: _Held, x: Array) -> None:
+    def _aim(self, held: _Held) -> None:
         """What `_rebuild` does for a hold of which only the position has changed."""
         d, rows = self._spline.dimension, self.rows
         own = slice(held.first, held.first + len(held.multipliers))
         start, width = rows.start[held.first], 4 * self._spline.n_dof
-        rows.before[own] = rows.rows[own, :width] @ x[start : start + width]
+        rows.before[own] = rows.rows[own, :width] @ self._x[start : start + width]
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
 
-    def _make_rows(self, held: _Held, values: Array) -> Array:
+    def _make_own_rows(self, held: _Held, values: Array) -> Array:
         """Coefficients of one hold's rows from the basis there (3, 4)."""
         d, n_dof = self._spline.dimension, self._spline.n_dof
         rows = np.zeros((len(held.multipliers), 4, n_dof))

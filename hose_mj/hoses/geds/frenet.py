@@ -6,7 +6,7 @@ Theetten, Grisoni, Andriot, Barsky (2008) measure theta from the Frenet normal o
 
 Only for reproduction: the second term has no value where the hose is straight or inflects, and
 r''' of a cubic jumps at the knots (docs/frenet.md). Needs no director, so bending is that of
-bending.py. With c = r''', constant in a span and made of r'' at its outer Gauss points,
+energy.py. With c = r''', constant in a span and made of r'' at its outer Gauss points,
 
     d tau = (dN - (N / D) dD) / D,
     d2 tau = (d2N - (N / D) d2D - d tau dD^T - dD d tau^T) / D

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError, StepError
+from hose_mj.errors import InputError
 from hose_mj.hoses.geds import integrators, mechanics, records
 from hose_mj.hoses.geds.body import SplineBody
-from hose_mj.hoses.geds.body_coupling import BodyCoupling, Dynamics
+from hose_mj.hoses.geds.body_coupling import BodyCoupling
 from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
@@ -198,7 +199,7 @@ class GedsHose(SplineBody):
         self._spline.offset = state["offset"].copy()
         self._counts[:] = state["steps"], state["iterations"], state["fallbacks"]
         self._loads.restore(state["loads"])
-        self._constraints.restore(state["holds"], self._state.x)
+        self._constraints.restore(state["holds"])
         self.contacts.restore(state["contacts"])
         self.contacts.set_closed(self.is_closed)
 
@@ -221,14 +222,14 @@ class GedsHose(SplineBody):
         place = self._spline.check_place(arc_length)
         aim = self._spline.check_direction(self.tangent(place)[0] if tangent is None else tangent)
         across = None if director is None else self._constraints.check_director(director, aim)
-        hold = self._constraints.add(arc_length, position, aim, self._state.x)
+        hold = self._constraints.add(arc_length, position, aim)
         if across is not None:
-            self._constraints.turn_to(hold, across, self._state.x)
+            self._constraints.turn_to(hold, across)
         return hold
 
     def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
         """Holds a point and leaves the tangent free; by default where it is now. See `clamp`."""
-        return self._constraints.add(arc_length, position, None, self._state.x)
+        return self._constraints.add(arc_length, position, None)
 
     def move(
         self,
@@ -244,7 +245,7 @@ class GedsHose(SplineBody):
         `InputError` for a hold that was released, a tangent or a spin for an attachment, vectors
         out of a planar hose's plane.
         """
-        self._constraints.move(hold, position, tangent, spin, self._state.x)
+        self._constraints.move(hold, position, tangent, spin)
 
     @property
     def holds(self) -> list[Hold]:
@@ -253,14 +254,14 @@ class GedsHose(SplineBody):
 
     def release(self, hold: Hold) -> None:
         """Lets go; raises `InputError` for a hold that was released before."""
-        self._constraints.release(hold, self._state.x)
+        self._constraints.release(hold)
 
     def reaction(self, hold: Hold) -> Reaction:
         """Force (N) and moment (N m) of a hold on the hose at the end of the last step.
 
         Both in the world frame. Raises `InputError` for a hold that was released.
         """
-        return self._constraints.reaction(hold, self._state.x)
+        return self._constraints.reaction(hold)
 
     def close(self, spin: float = 0.0) -> None:
         """Joins the end of the hose to its beginning: an O-ring, a belt, a rubber band.
@@ -276,12 +277,12 @@ class GedsHose(SplineBody):
         """
         if self._spline.has_theta:
             raise InputError("twist", "theta", "scalar for a hose that is to be closed")
-        self._constraints.close(spin, self._state.x)
+        self._constraints.close(spin)
         self.contacts.set_closed(True)
 
     def open(self) -> None:
         """Parts the ends that `close` has joined; raises `InputError` for an open hose."""
-        self._constraints.open(self._state.x)
+        self._constraints.open()
         self.contacts.set_closed(False)
 
     @property
@@ -334,28 +335,15 @@ class GedsHose(SplineBody):
                 holds.
             StepError: no equilibrium was found; the state before is kept.
         """
-        check_count("load_steps", load_steps, 1, mechanics.MOST_LOAD_STEPS)
+        check_count("load_steps", load_steps, 1, MOST_LOAD_STEPS)
         if self.is_closed and self._constraints.is_free:
             valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
             raise InputError("holds of a closed loop", "none", valid)
-        work = self._make_work()
-        found = mechanics.compute_equilibrium(
-            *(self._axes, self._hose, self._constraints.rows, self._loads.loads),
-            *(self._state.x, work, int(load_steps)),
-        )
-        self._counts[[ITERATIONS, FALLBACKS]] += found.iterations, found.fallbacks
-        if found.verdict != records.DONE:
-            raise StepError(f"no static equilibrium was found: {records.VERDICTS[found.verdict]}")
-        state = integrators.make_state(self._spline.size)
-        state.x[:] = found.x
-        self._set_state(state)
-        mechanics.accept(self._axes, self._hose, self._constraints.rows, self._state, work)
+        self._dynamics.solve_static(int(load_steps))
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and constraint rows in the control points' n d coordinates."""
-        rows, size = self._constraints.rows, self._spline.size
-        work = self._build_tangent()
-        return mechanics.compute_linearization(self._axes, self._hose, rows, work, size)
+        return self._dynamics.linearize()
 
     def compute_required_forces(self, acceleration: ArrayLike) -> Array:
         """Forces on the control points for wanted accelerations of theirs (inverse dynamics).
@@ -375,7 +363,7 @@ class GedsHose(SplineBody):
         n = self._spline.n_control_points
         if wanted.shape != (n, 3) or not np.all(np.isfinite(wanted)):
             raise InputError("acceleration", wanted.shape, f"finite numbers, shape ({n}, 3)")
-        work = self._build_tangent()
+        work = self._dynamics.build_tangent()
         drag = self._hose.drag_rate * self._state.v
         inertia = self._multiply_mass(self._spline.from_world(wanted) + drag)
         internal = work.gradient[: self._spline.size]
@@ -399,19 +387,4 @@ class GedsHose(SplineBody):
         self._counts[STEPS] = 0
         self.contacts.set_closed(False)
         self._loads.clear()
-        self._constraints.clear(self._state.x, director)
-
-    def _make_work(self) -> records.Work:
-        spline = self._spline
-        made: records.Work = records.make_work(
-            spline.n_control_points, spline.n_dof, self._constraints.n_rows
-        )
-        return made
-
-    def _build_tangent(self) -> records.Work:
-        work = self._make_work()
-        mechanics.build_tangent(
-            *(self._axes, self._hose, self._constraints.rows, self._loads.loads),
-            *(self._state.x, self._state.v, work),
-        )
-        return work
+        self._constraints.clear(director)

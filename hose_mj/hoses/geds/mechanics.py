@@ -1,4 +1,4 @@
-"""What stands between `GedsHose` and the kernels: constants, equilibrium, tangents, tension.
+"""What stands between `GedsHose` and the kernels: constants, dense matrices, tension, twist.
 
 A hose may vary along its length. A Gauss point stands for a cell of its span as long as its weight,
 and has the mean of that cell: a short coupling between two Gauss points is not lost, and the mass
@@ -8,31 +8,18 @@ is right to the last gram.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, frames, integrators, newton, records
-from hose_mj.hoses.geds.contact import add_contact
+from hose_mj.hoses.geds import basis, integrators, newton, records
 from hose_mj.hoses.geds.frenet import SMALLEST_BEND
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.geds.twist import Twist, accept_twist, find_owners
-from hose_mj.hoses.protocol import Array, Linearization
+from hose_mj.hoses.geds.twist import Twist, find_owners
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.jit import compile_notice, run_kernel
-
-_ENDLESS = float(np.finfo(np.float64).max)
-MOST_LOAD_STEPS = 64
-_STATIC_TOLERANCE = 1e-10
-_STATIC_ITERATIONS = 400
-_STATIC_TURN = 0.5
-"""Largest turn of a tangent in one static iteration (rad): beats an energy line search near
-inextensibility."""
-_RESET_ITERATIONS = 8
-"""A hose with theta resets its frames after so many iterations; with frames that have gathered
-much of the hose's own turns the iteration crawls."""
 
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
@@ -135,36 +122,6 @@ def multiply_mass(axes: tuple[float, ...], hose: records.Hose, flat: Array) -> A
     return out
 
 
-def build_tangent(
-    axes: tuple[float, ...],
-    hose: records.Hose,
-    constraints: records.Constraints,
-    loads: records.Loads,
-    x: Array,
-    v: Array,
-    work: records.Work,
-) -> None:
-    """Writes dU + C v less moments and contact to work.gradient, its derivative to work.band.
-
-    Forces, gravity, inertia and constraints are left out; so are the derivative of damping and
-    friction and the rank-one terms of the twist.
-    """
-    work.gradient[:] = 0.0
-    work.band[:] = 0.0
-    work.rate[: len(x)] = v
-    run_kernel(integrators.start_step, axes, constraints, np.inf)
-    run_kernel(
-        *(energy.assemble, axes, hose, constraints.twist, 0.0, x, work.rate, np.inf, True),
-        *(work.span, work.gradient, work.band),
-    )
-    run_kernel(newton.add_moments, axes, loads, True, x, work)
-    # Within a step without end nothing changes its velocity, but what slides still rubs.
-    run_kernel(
-        *(add_contact, axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
-        *(work.gradient, work.band),
-    )
-
-
 def make_dense(band: Array, size: int, width: int) -> Array:
     """Returns the symmetric matrix (size, size) of a lower band stored by columns."""
     dense = np.zeros((size, size))
@@ -183,24 +140,6 @@ def make_dense_rows(constraints: records.Constraints, size: int, width: int) -> 
     if constraints.rows.shape[1] > width:
         dense[:, size - width :] += constraints.rows[:, width:]
     return dense
-
-
-def compute_linearization(
-    axes: tuple[float, ...],
-    hose: records.Hose,
-    constraints: records.Constraints,
-    work: records.Work,
-    size: int,
-) -> Linearization:
-    """Returns dense mass, stiffness (of `build_tangent`) and constraints; overwrites work.band."""
-    width = 4 * len(axes)
-    stiffness = make_dense(work.band, size, width)
-    for row, compliance in zip(constraints.twist.rows, constraints.twist.compliance, strict=True):
-        stiffness += np.outer(row[:size], row[:size]) / compliance
-    work.band[:] = 0.0
-    run_kernel(newton.add_mass, axes, hose, 1.0, work.band)
-    mass = make_dense(work.band, size, width)
-    return Linearization(mass, stiffness, make_dense_rows(constraints, size, width))
 
 
 def interpolate_tension(forces: Array, length: float, s: Array) -> Array:
@@ -260,122 +199,3 @@ def compute_twist(spline: Spline, hose: records.Hose, twist: Twist, s: Array, x:
         inside = (s >= places[first]) & (s <= places[last])
         rate[inside] = torque / get_torsional_stiffness(hose, s[inside])
     return rate
-
-
-class Equilibrium(NamedTuple):
-    """Answer of `compute_equilibrium`: a verdict of records.py, control points (n d,), counters."""
-
-    verdict: int
-    x: Array
-    iterations: int
-    fallbacks: int
-
-
-def compute_equilibrium(
-    axes: tuple[float, ...],
-    hose: records.Hose,
-    constraints: records.Constraints,
-    loads: records.Loads,
-    x: Array,
-    work: records.Work,
-    load_steps: int,
-) -> Equilibrium:
-    """Newton's iteration for statics, capped by the turn of the tangents.
-
-    The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails. The
-    constraints' multipliers are left in work.multipliers.
-    """
-    length = hose.tables.span_length * len(hose.tables.first)
-    limits = records.Limits(
-        _STATIC_TOLERANCE * length,
-        length,
-        _STATIC_ITERATIONS,
-        _STATIC_TURN,
-        False,
-        1.0,
-    )
-    found = Equilibrium(records.NOT_CONVERGED, x, 0, 0)
-    changing = (
-        constraints.twist.accepted,
-        constraints.twist.spin,
-        constraints.before,
-        constraints.after,
-    )
-    before = [part.copy() for part in changing]
-    iterations, fallbacks = 0, 0
-    while found.verdict != records.DONE and load_steps <= MOST_LOAD_STEPS:
-        for part, accepted in zip(changing, before, strict=True):
-            part[:] = accepted
-        run_kernel(integrators.start_step, axes, constraints, np.inf)
-        found = Equilibrium(records.NOT_CONVERGED, x.copy(), 0, 0)
-        for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
-            found = _iterate(axes, hose, constraints, loads, scale, limits, found.x, work)
-            iterations += found.iterations
-            fallbacks += found.fallbacks
-            if found.verdict != records.DONE:
-                break
-        load_steps *= 2
-    if found.verdict != records.DONE:
-        for part, accepted in zip(changing, before, strict=True):
-            part[:] = accepted
-    return Equilibrium(found.verdict, found.x, iterations, fallbacks)
-
-
-def _iterate(
-    axes: tuple[float, ...],
-    hose: records.Hose,
-    constraints: records.Constraints,
-    loads: records.Loads,
-    scale: float,
-    limits: records.Limits,
-    x: Array,
-    work: records.Work,
-) -> Equilibrium:
-    """Newton's iteration at one load; a hose with theta resets its frames every now and then."""
-    stage = (np.inf, x.copy(), np.zeros_like(x))
-    state = integrators.make_state(len(x))
-    state.x[:] = x
-    if len(axes) == 4:
-        limits = limits._replace(max_iterations=_RESET_ITERATIONS)
-    verdict, iterations, fallbacks = records.NOT_CONVERGED, 0, 0
-    for _ in range(_STATIC_ITERATIONS // _RESET_ITERATIONS):
-        verdict, more, fell = run_kernel(
-            *(
-                newton.newton,
-                axes,
-                hose,
-                stage,
-                constraints,
-                1.0,
-                loads,
-                scale,
-                limits,
-                state.x,
-                work,
-            )
-        )
-        iterations += more
-        fallbacks += fell
-        if len(axes) != 4 or verdict not in (records.DONE, records.NOT_CONVERGED):
-            break
-        theta = state.x[3::4].copy()
-        run_kernel(frames.accept_frames, axes, hose, constraints, state, work.span)
-        if verdict == records.DONE and np.array_equal(theta, state.x[3::4]):
-            break
-    return Equilibrium(verdict, state.x, iterations, fallbacks)
-
-
-def accept(
-    axes: tuple[float, ...],
-    hose: records.Hose,
-    constraints: records.Constraints,
-    state: integrators.State,
-    work: records.Work,
-) -> None:
-    """Ends a static solve like a step: twist, frames and constraints are what was found."""
-    constraints.multipliers[:] = work.multipliers[: len(constraints.multipliers)]
-    constraints.before[:] = constraints.after
-    if len(axes) == 3:
-        run_kernel(accept_twist, axes, constraints.twist, state.x)
-    elif len(axes) == 4:
-        run_kernel(frames.accept_frames, axes, hose, constraints, state, work.span)

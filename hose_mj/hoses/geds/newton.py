@@ -194,11 +194,9 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
         work: work arrays; multipliers on return.
     """
     twist = constraints.twist
-    fallbacks = 0
+    fallbacks = shortened = 0
     exact = True
-    shortened = 0
-    factor = 0.0
-    slope = 0.0
+    factor = slope = 0.0
     iteration = 1
     softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
     while True:

@@ -346,3 +346,15 @@ def test_random_states_among_obstacles_stay_finite():
             assert np.all(np.isfinite(hose.control_velocities))
     assert touched > 150
     assert verdicts <= 3
+
+
+def test_names_that_moved_to_a_part_say_where(make_hose):
+    hose = make_hose()
+    with pytest.warns(DeprecationWarning, match="add_floor is now GedsHose.contacts.add_floor"):
+        assert hose.add_floor(-1.0) == 0
+    with pytest.warns(DeprecationWarning, match="contacts.obstacles"):
+        assert hose.obstacles is hose.contacts.obstacles
+    with pytest.warns(DeprecationWarning, match="contacts.list_reactions"):
+        assert len(hose.contact_reactions()) == 1
+    with pytest.raises(AttributeError, match="'no_such_name'"):
+        _ = hose.no_such_name

@@ -63,7 +63,7 @@ def factorize_indefinite(axes, size, band, signs):
     n_negative = 0
     for j in range(size):
         pivot = band[j, 0]
-        if not abs(pivot) > 1e-300:  # its inverse would not be finite
+        if not abs(pivot) > 1e-300:  # as good as zero
             return -1
         sign = 1.0
         if pivot < 0.0:

@@ -253,6 +253,7 @@ def _find_nearest(room, q, j):
         side = room[j + 1, c] - room[j, c]
         square += side * side
         along += side * (room[q, c] - room[j, c])
+    # A segment without length is nearest at its start.
     t = min(max(along / max(square, 1e-300), 0.0), 1.0)
     distance = 0.0
     for c in range(3):
@@ -325,6 +326,7 @@ def _push_apart(axes, contact, pair, rate, step, gradient, band):
     n0 = room[q, 0] - (1.0 - t) * room[j, 0] - t * room[j + 1, 0]
     n1 = room[q, 1] - (1.0 - t) * room[j, 1] - t * room[j + 1, 1]
     n2 = room[q, 2] - (1.0 - t) * room[j, 2] - t * room[j + 1, 2]
+    # Centre lines that meet have no normal and do not push.
     distance = max(np.sqrt(n0 * n0 + n1 * n1 + n2 * n2), 1e-9)
     normal = (n0 / distance, n1 / distance, n2 / distance)
     start_q, start_j = (q // per_span) * d, (j // per_span) * d

@@ -61,6 +61,7 @@ class ContactSet:
     ) -> None:
         self._spline, self._spec, self._timestep = spline, spec, timestep
         self._state, self._scheme = state, scheme
+        # Without gravity a hose is still pressed against things: as if by its weight on Earth.
         self._pull = max(9.81, float(np.linalg.norm(gravity)))
         self._is_closed = False
         # The hose's coordinates first: a reflection where that is an odd permutation.
@@ -179,7 +180,7 @@ class ContactSet:
             place = self._spline.evaluate(self.arc_lengths, self._state.x)
             given[:, 8:11] = place[:, self.order]
         self._given = given
-        self.rebuild()
+        self._rebuild()
 
     def set_neighbour(
         self,
@@ -217,21 +218,13 @@ class ContactSet:
         self._capsules = _make_capsules(ends, speeds[:, self.order], radius)
         self._capsules[:, shapes.FRICTION] = friction
         self._capsules[:, shapes.SCALE] = stiffness / self._numbers[contact_law.STIFFNESS]
-        self.rebuild()
+        self._rebuild()
 
     def set_closed(self, is_closed: bool) -> None:
         """Says whether the hose is a closed loop, whose ends do not touch each other."""
         self._is_closed = is_closed
         self._numbers = self._make_law()
-        self.rebuild()
-
-    def rebuild(self) -> None:
-        """Makes what the kernels read; to be called where the plane of the hose has moved."""
-        geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
-        room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
-        self.contact: contact_law.Contact = contact_law.Contact(
-            self._points, geoms, self._given, self._numbers, self.arc_lengths, room
-        )
+        self._rebuild()
 
     def compute_stiffness(self) -> float:
         """What a contact's force per length grows by with the depth within one step, N/m^2.
@@ -318,7 +311,7 @@ class ContactSet:
         self._set([Obstacle(**one) for one in state["obstacles"]], ContactLaw(**state["law"]))
         self._given = state["given"].copy()
         self._capsules = state["capsules"].copy()
-        self.rebuild()
+        self._rebuild()
 
     # -- inside ----------------------------------------------------------------------------------
 
@@ -336,7 +329,15 @@ class ContactSet:
         self.arc_lengths: Array
         self._points: Array
         self.arc_lengths, self._points = self._make_points()
-        self.rebuild()
+        self._rebuild()
+
+    def _rebuild(self) -> None:
+        """Makes what the kernels read."""
+        geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
+        room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
+        self.contact: contact_law.Contact = contact_law.Contact(
+            self._points, geoms, self._given, self._numbers, self.arc_lengths, room
+        )
 
     def _compute_local(self, touched: contact_law.Contact) -> tuple[Array, Array]:
         """Forces on the hose (Q, 3) and on the geoms (G, 6) in the hose's coordinates."""

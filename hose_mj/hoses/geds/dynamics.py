@@ -19,9 +19,13 @@ from hose_mj.hoses.protocol import Array, Linearization
 from hose_mj.jit import run_kernel
 
 _ENDLESS = float(np.finfo(np.float64).max)
+"""A step that changes no velocity (s), yet is finite: contact takes an infinite one for statics."""
 MOST_LOAD_STEPS = 64
+"""Into so many the loads are divided at most: six halvings of what has failed."""
 _STATIC_TOLERANCE = 1e-10
+"""Of the last move of a control point, in lengths of the hose."""
 _STATIC_ITERATIONS = 400
+"""At half a radian an iteration a tangent may turn thirty times round in so many."""
 _STATIC_TURN = 0.5
 """Largest turn of a tangent in one static iteration (rad): beats an energy line search near
 inextensibility."""

@@ -27,8 +27,8 @@ from hose_mj.jit import choose_by_unknowns, inlined, merged
 _MOST_SHORTENINGS = 12
 """Of one step: at the least factor of each that is 1e-12 of it, where rounding begins."""
 _STEEP = 0.5
-"""The line search shortens a step at whose end the residual still does this part of the work that
-it did at the start: half is the usual curvature condition of a search for a root."""
+"""A step is shortened where the energy rises at its end by more than this part of how it fell at
+its start; a lesser rise Newton's next step mends."""
 _LEAST_FACTOR, _MOST_FACTOR = 0.1, 0.7
 """Of one shortening: the secant's root, kept from creeping and from giving up the step at once."""
 

@@ -157,7 +157,7 @@ def test_turning_the_whole_hose_changes_nothing(kind):
     moved = x.reshape(N, 4).copy()
     moved[:, :3] = moved[:, :3] @ turn.T + rng.normal(size=3)
     turned = make_twist(x)
-    for part in (turned.frames, turned.kept):
+    for part in (turned.frames, turned.accepted):
         for k in (0, 3, 6):
             part[:, k : k + 3] = twist.frames[:, k : k + 3] @ turn.T
     assert compute_energy(moved.ravel(), turned) == pytest.approx(

@@ -50,6 +50,11 @@ class ContactSet:
         order: the world axes in the order of the hose's coordinates.
     """
 
+    contact: contact_law.Contact
+    obstacles: tuple[Obstacle, ...]
+    arc_lengths: Array
+    _points: Array
+
     def __init__(
         self,
         spline: Spline,
@@ -321,13 +326,10 @@ class ContactSet:
             raise InputError("scheme", self._scheme, valid)
 
     def _set(self, obstacles: Sequence[Obstacle], law: ContactLaw) -> None:
-        self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
-        self.law = law
+        self.obstacles, self.law = tuple(obstacles), law
         self._given = np.zeros((0, contact_law.GIVEN))
         self._capsules = np.zeros((0, shapes.ROW))
         self._numbers = self._make_law()
-        self.arc_lengths: Array
-        self._points: Array
         self.arc_lengths, self._points = self._make_points()
         self._rebuild()
 
@@ -335,7 +337,7 @@ class ContactSet:
         """Makes what the kernels read."""
         geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
         room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
-        self.contact: contact_law.Contact = contact_law.Contact(
+        self.contact = contact_law.Contact(
             self._points, geoms, self._given, self._numbers, self.arc_lengths, room
         )
 

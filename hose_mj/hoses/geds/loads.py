@@ -24,6 +24,8 @@ class LoadSet:
         contacts: what may be touched.
     """
 
+    _loads: records.Loads
+
     def __init__(self, spline: Spline, weight: Array, contacts: ContactSet) -> None:
         self._spline = spline
         self._weight = weight
@@ -113,6 +115,4 @@ class LoadSet:
             else:
                 moments[k, 0] = vector @ self._spline.normal
         values = np.ascontiguousarray(values[:, :2])
-        self._loads: records.Loads = records.Loads(
-            force, starts, values, moments, self._contacts.contact
-        )
+        self._loads = records.Loads(force, starts, values, moments, self._contacts.contact)

@@ -90,7 +90,7 @@ class GedsWorld(World):
         self._bodies = Bodies(self.model, self.data, self.sites[:-1])
         self._start = relax_hose(
             *(scene.spec, self.site_positions(), self.arc_lengths),
-            *(self.hose.obstacles, self.hose.gravity, n),
+            *(self.hose.contacts.obstacles, self.hose.gravity, n),
         ).control_points
         self._pucks = Pucks.find(self, self._touch) if compiled_pucks else None
         # The coefficients of the centre line are linear in the control points.
@@ -153,7 +153,7 @@ class GedsWorld(World):
     def attachment_forces(self) -> Array:
         """See `World.attachment_forces`: means over the last step; at the source its end's."""
         at_source = self.hose.reaction(self._holds[-1]).force
-        return np.concatenate([self.hose.mean_forces(), at_source[None]])
+        return np.concatenate([self.hose.coupling.compute_mean_forces(), at_source[None]])
 
     def hose_snapshot(self) -> dict[str, Any]:
         """See `World.hose_snapshot`."""
@@ -186,7 +186,7 @@ class GedsWorld(World):
                 f"the step at t = {self.time:.6g} s failed: MuJoCo met numbers that are not "
                 f"finite; try a time step below {self.timestep:g} s or smaller controls"
             )
-        hose.keep_step()
+        hose.coupling.accept_step()
         bodies.end()
         self._touch.update()
 
@@ -205,7 +205,7 @@ class GedsWorld(World):
         for _ in range(MOST_SWEEPS):
             aim = best.reached + (give @ best.forces.ravel()).reshape(-1, 3)
             try:
-                found = hose.try_step(held, aim, give)
+                found = hose.coupling.try_step(held, aim, give)
             except StepError:
                 if is_symmetric:
                     raise
@@ -213,7 +213,7 @@ class GedsWorld(World):
                 continue
             self.sweeps += 1
             moved = bodies.try_step(found)
-            missed = moved - hose.find_held_positions()
+            missed = moved - hose.coupling.compute_positions()
             gap = float(np.abs(missed).max())
             is_quick, change = gap < best.gap / _SLOW, (found - best.forces).ravel()
             if gap < best.gap:
@@ -225,7 +225,7 @@ class GedsWorld(World):
             else:
                 give = give - np.outer(missed.ravel(), change) / max(float(change @ change), 1e-300)
             is_symmetric = False
-        hose.try_step(held, best.aim, best.give)
+        hose.coupling.try_step(held, best.aim, best.give)
         bodies.try_step(best.forces)
 
 

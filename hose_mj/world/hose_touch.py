@@ -46,19 +46,19 @@ class HoseTouch:
         self.pushes = np.zeros((len(self.geoms.moving), 6))
         self._moving = self.geoms.ids[self.geoms.moving]
         self._meter = None
-        self._measured = Distances.none(len(hose.contact_arc_lengths))
-        self._measured_forces = np.zeros((len(hose.contact_arc_lengths), 3))
+        self._measured = Distances.none(len(hose.contacts.arc_lengths))
+        self._measured_forces = np.zeros((len(hose.contacts.arc_lengths), 3))
         if len(self.geoms.measured):
             reach = _REACH * hose.spec.outer_radius
             low, high = self.geoms.measured_skips.T[:, :, None]
-            s = hose.contact_arc_lengths
+            s = hose.contacts.arc_lengths
             touched = (s < low) | (s > high)
             self._meter = GeomMeter(model, self.geoms.measured, touched, reach)
 
     def set_obstacles(self, friction: float) -> None:
         """Hands the geoms to the hose as obstacles, where they are now."""
         self._friction = friction
-        stiffness = self._hose.contact_stiffness()
+        stiffness = self._hose.contacts.compute_stiffness()
         made = self.geoms.make_obstacles(self._model, self._data, friction, stiffness)
         self._hose.set_obstacles(made)
 
@@ -91,21 +91,21 @@ class HoseTouch:
         twists = self._find_twists(self._moving)
         rotations = data.geom_xmat[self._moving].reshape(k, 3, 3)
         moving = self.geoms.moving
-        self._hose.place_obstacles(moving, data.geom_xpos[self._moving], rotations, twists)
+        self._hose.contacts.place_obstacles(moving, data.geom_xpos[self._moving], rotations, twists)
 
     def measure(self) -> None:
         """Measures meshes; to be called before each step."""
         if self._meter is None:
             return
         hose = self._hose
-        points = hose.position(hose.contact_arc_lengths)
+        points = hose.position(hose.contacts.arc_lengths)
         found = self._measured = self._meter.measure(self._data, points)
         speeds = np.zeros_like(points)
         near = np.unique(found.geoms[found.geoms >= 0])
         for g, twist in zip(near, self._find_twists(near), strict=True):
             mine = found.geoms == g
             speeds[mine] = twist[:3] + np.cross(twist[3:], points[mine] - self._data.geom_xpos[g])
-        hose.set_distances(found.distances, found.normals, self._friction, speeds)
+        hose.contacts.set_distances(found.distances, found.normals, self._friction, speeds)
 
     def _find_twists(self, geoms: np.ndarray) -> Array:
         """Velocities and angular velocities of geoms (k,), (k, 6); `mj_comVel` goes before."""
@@ -119,10 +119,10 @@ class HoseTouch:
     def update(self) -> None:
         """After a step: what the hose did to geoms, where it felt them, is known; they move on."""
         if self._meter is not None:
-            self._measured_forces[:] = self._hose.measured_forces()
+            self._measured_forces[:] = self._hose.contacts.compute_given_forces()
         if not len(self._moving):
             return
-        self.pushes[:] = self._hose.push_on_obstacles()[self.geoms.moving]
+        self.pushes[:] = self._hose.contacts.compute_reactions()[self.geoms.moving]
         self.place()
 
     def push(self, generalized: Array) -> None:
@@ -139,7 +139,7 @@ class HoseTouch:
             if self._measured.geoms[q] < 0 or self._model.body_weldid[body] == 0:
                 continue
             if points is None:
-                points = self._hose.position(self._hose.contact_arc_lengths)
+                points = self._hose.position(self._hose.contacts.arc_lengths)
             force = -self._measured_forces[q]
             mujoco.mj_applyFT(
                 *(self._model, self._data, force, np.zeros(3), points[q], body, generalized)

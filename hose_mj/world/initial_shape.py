@@ -126,8 +126,8 @@ def _judge(hose: GedsHose, arc_lengths: Array, points: Array, earlier: Array) ->
 
 def _find_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:
     """Least distance of points (k, 3) of the hose from obstacles, nearly a radius at most (m)."""
-    distances = hose.measure_obstacles(points)
-    for row, obstacle in zip(distances, hose.obstacles, strict=True):
+    distances = hose.contacts.measure_obstacles(points)
+    for row, obstacle in zip(distances, hose.contacts.obstacles, strict=True):
         low, high = obstacle.skips
         row[(arc_lengths >= low) & (arc_lengths <= high)] = np.inf
     return float(distances.min(initial=0.99 * hose.spec.outer_radius))

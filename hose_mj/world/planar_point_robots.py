@@ -73,7 +73,7 @@ class Pucks:
             radius=radius,
             across=2 if flat else 3,
             reach=reach,
-            walls=world.hose.make_shapes(_find_walls(model, data, flat)),
+            walls=world.hose.contacts.make_shapes(_find_walls(model, data, flat)),
             owner=owner,
             arm=arm,
             push=np.zeros((k, 3)),
@@ -137,7 +137,7 @@ class Pucks:
             np.add.at(masses.push, owner[moving], touch.pushes[:, :3])
         start = masses.position.copy()
         try:
-            return self._finish(world.hose.step_with_masses(holds, masses, n_steps), start)
+            return self._finish(world.hose.coupling.step_with_masses(holds, masses, n_steps), start)
         except BaseException:
             self._finish(0, start)
             raise

@@ -96,7 +96,7 @@ def test_a_light_puck_pressed_to_a_wall_by_the_hose_stays_with_it(write_scene, t
 def test_hose_on_the_floor_hands_its_weight_to_floor_and_sites():
     world = make_world("floor_2")
     world.step(500)
-    on_floor = world.hose.push_on_obstacles()[:, 2].sum()
+    on_floor = world.hose.contacts.compute_reactions()[:, 2].sum()
     held = world.attachment_forces()[:, 2].sum()
     weight = 9.81 * world.scene.spec.mass
     assert held - on_floor == pytest.approx(weight, rel=1e-3)
@@ -112,7 +112,7 @@ def test_what_the_hose_does_to_a_body_moves_it(write_scene):
     robots = [write_scene.slider(0, (0.8, 0.0, 0.0), 1.0, axes="xy", solid=False)]
     world = GedsWorld(write_scene(robots, table, gravity="0 0 -9.81", linear_density=0.5))
     world.step(1000)
-    (push,) = world.hose.push_on_obstacles()
+    (push,) = world.hose.contacts.compute_reactions()
     assert push[2] < -0.5 * 0.5 * 9.81 * 0.5
     sunk = -float(world.data.joint(0).qpos[0])
     assert sunk == pytest.approx((9.81 - push[2]) / 400.0, rel=1e-4)
@@ -205,7 +205,7 @@ def test_the_hose_rubs_on_what_turns_under_it(write_scene):
         world.data.qvel[0] = spin
         world.restore(world.snapshot())
         world.step(20)
-        pulls.append(float(world.hose.push_on_obstacles()[0, 0]))
+        pulls.append(float(world.hose.contacts.compute_reactions()[0, 0]))
     assert pulls[0] < -0.02
     assert pulls[1] > 0.02
 

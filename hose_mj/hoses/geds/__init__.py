@@ -1,6 +1,6 @@
 """Geometrically Exact Dynamic Splines: kernels over arrays below, the thin class `GedsHose` above.
 
 basis.py (B-splines, quadrature, mass) <- energy.py (strain energy, its derivatives) and band.py
-(banded Cholesky) <- solver.py (Newton for one stage, statics) <- schemes.py (time stepping) <-
-model.py (GedsHose).
+(banded Cholesky) <- kkt.py (with Lagrange multipliers) <- newton.py (Newton for one stage, statics)
+<- integrators.py (time stepping) <- hose.py (GedsHose).
 """

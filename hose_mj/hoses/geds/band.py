@@ -13,7 +13,7 @@ from hose_mj.jit import inlined, kernel
 
 
 @kernel
-def factorize(axes, size, band):  # type: ignore[no-untyped-def]
+def factorize(axes, size, band):
     """Replaces the first `size` columns by their Cholesky factor; False at a pivot not above 0."""
     width = 4 * len(axes)
     for j in range(size):
@@ -29,7 +29,7 @@ def factorize(axes, size, band):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _eliminate(axes, j, sign, band):  # type: ignore[no-untyped-def]
+def _eliminate(axes, j, sign, band):
     """Subtracts sign times column j's outer product from the columns after it.
 
     Four columns at a time have inner loops of one length, four less than those before.
@@ -44,7 +44,7 @@ def _eliminate(axes, j, sign, band):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _eliminate_from(j, first, end, length, sign, band):  # type: ignore[no-untyped-def]
+def _eliminate_from(j, first, end, length, sign, band):
     """`_eliminate` for columns j + first to j + end - 1."""
     for k in range(first, end):
         factor = sign * band[j, k]
@@ -53,7 +53,7 @@ def _eliminate_from(j, first, end, length, sign, band):  # type: ignore[no-untyp
 
 
 @kernel
-def factorize_indefinite(axes, size, band, signs):  # type: ignore[no-untyped-def]
+def factorize_indefinite(axes, size, band, signs):
     """Replaces the first `size` columns by L of L S L^T, S = diag(signs), signs 1 or -1.
 
     Returns the number of negative pivots, -1 at a pivot that is as good as zero or no number. There
@@ -63,7 +63,7 @@ def factorize_indefinite(axes, size, band, signs):  # type: ignore[no-untyped-de
     n_negative = 0
     for j in range(size):
         pivot = band[j, 0]
-        if not abs(pivot) > 1e-300:
+        if not abs(pivot) > 1e-300:  # as good as zero
             return -1
         sign = 1.0
         if pivot < 0.0:
@@ -79,7 +79,7 @@ def factorize_indefinite(axes, size, band, signs):  # type: ignore[no-untyped-de
 
 
 @kernel
-def solve_lower(axes, size, band, rows):  # type: ignore[no-untyped-def]
+def solve_lower(axes, size, band, rows):
     """Solves L y = rhs in place for every row of `rows` (m, size + 4 d), zero after `size`.
 
     The rows advance together, so that the processor need not wait for the end of each.
@@ -98,7 +98,7 @@ def solve_lower(axes, size, band, rows):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def solve_upper(axes, size, band, rhs):  # type: ignore[no-untyped-def]
+def solve_upper(axes, size, band, rhs):
     """Solves L^T x = rhs in place; rhs (size + 4 d) vanishes after `size`.
 
     The d unknowns of a control point take what is known of the rest of the hose side by side.

@@ -63,7 +63,7 @@ def make_greville(knots: Array) -> Array:
 
 
 @compiled
-def evaluate_basis(knots, arc_lengths, spans, values):  # type: ignore[no-untyped-def]
+def evaluate_basis(knots, arc_lengths, spans, values):
     """Cox-de Boor recursion (thesis A.2) with two derivatives.
 
     Writes the span (k,) of each arc length and `values` (k, 3, 4): N, dN/ds and d2N/ds2 of the four
@@ -102,7 +102,7 @@ def evaluate_basis(knots, arc_lengths, spans, values):  # type: ignore[no-untype
 
 
 @inlined
-def find_kind(n_spans, e):  # type: ignore[no-untyped-def]
+def find_kind(n_spans, e):
     """Kind of span e: the first three and the last three are one each, all between them a seventh.
 
     Tables by kind stay in the processor's nearest memory however long the hose is.
@@ -111,7 +111,7 @@ def find_kind(n_spans, e):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _difference(knots, span, degree, i, before, after):  # type: ignore[no-untyped-def]
+def _difference(knots, span, degree, i, before, after):
     """Derivative of N_(span + 3 - degree + i, degree) from its two neighbours of lower degree."""
     at = span + DEGREE - degree + i
     value = 0.0

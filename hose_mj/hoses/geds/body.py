@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, frames, mechanics
-from hose_mj.hoses.geds import integrators as schemes
-from hose_mj.hoses.geds.constraints import HoldSet
+from hose_mj.hoses.geds import basis, energy, frames, integrators, mechanics
+from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_arc_lengths, check_vector, sample_curve, sample_velocity
@@ -47,8 +46,8 @@ class SplineBody:
         self._hose = mechanics.make_constants(spec, spline.knots, frenet)
         uniform = spline.from_world(np.tile(self.gravity, (spline.n_control_points, 1)))
         self._weight = self._multiply_mass(uniform)
-        self._state = schemes.make_state(spline.size)
-        self._holds = HoldSet(spline, self._hose)
+        self._state = integrators.make_state(spline.size)
+        self._constraints = ConstraintSet(spline, self._hose, self._state.x)
         self._span = make_span()
         self._strains = np.zeros((spline.n_control_points - 3, 2))
 
@@ -102,17 +101,17 @@ class SplineBody:
         s = check_arc_lengths(arc_length, self.spec.length)
         if self._spline.has_theta and not self._hose.elasticity.frenet:
             run_kernel(
-                *(frames.move_frames, self._axes, self._hose.tables, self._holds.rows.twist),
+                *(frames.move_frames, self._axes, self._hose.tables, self._constraints.rows.twist),
                 *(self._state.x, self._span),
             )
         return mechanics.compute_twist(
-            self._spline, self._hose, self._holds.rows.twist, s, self._state.x
+            self._spline, self._hose, self._constraints.rows.twist, s, self._state.x
         )
 
     def torque(self, arc_length: ArrayLike) -> Array:
         """Moment about the tangent (k,), N m, positive where the far side turns right-handed."""
         s = check_arc_lengths(arc_length, self.spec.length)
-        stiffness = mechanics.find_torsional_stiffness(self._hose, s)
+        stiffness = mechanics.get_torsional_stiffness(self._hose, s)
         return np.asarray(stiffness * self.twist(s))
 
     def weigh_spans(self) -> tuple[Array, Array, Array]:
@@ -127,7 +126,7 @@ class SplineBody:
 
     def energies(self) -> Energies:
         """Energies at the present state (thesis A.10, A.15)."""
-        hose, twist = self._hose, self._holds.rows.twist
+        hose, twist = self._hose, self._constraints.rows.twist
         stretching, bending, twisting = run_kernel(
             *(energy.compute_energy, self._axes, hose.tables, hose.elasticity, twist.frames),
             *(self._state.x, self._span, self._strains),
@@ -150,13 +149,13 @@ class SplineBody:
 
     # -- inside ------------------------------------------------------------------------------------
 
-    def _lay(self, curve: Curve, velocity: Curve | None) -> None:
+    def _set_shape(self, curve: Curve, velocity: Curve | None) -> None:
         """Makes the state anew from a curve and a velocity; changes nothing if one is refused."""
         # Thesis A.3 samples uniformly; at 256 control points that is off by 40 L, this by 1e-13 L.
         arc_lengths = basis.make_greville(self._spline.knots)
         points = sample_curve(curve, self.spec.length, arc_lengths)
-        offset = self._spline.find_offset(points)
-        state = schemes.make_state(self._spline.size)
+        offset = self._spline.compute_offset(points)
+        state = integrators.make_state(self._spline.size)
         state.x[:] = self._spline.interpolate(arc_lengths, points)
         if self._spline.has_theta:
             state.x[3::4] = self.spec.rest_torsion * arc_lengths
@@ -165,9 +164,10 @@ class SplineBody:
             for speed in speeds:
                 self._spline.check_in_plane("velocity", speed, 1e-9)
             state.v[:] = self._spline.interpolate(arc_lengths, speeds)
-        self._state, self._spline.offset = state, offset
+        self._spline.offset = offset
+        self._set_state(state)
 
-    def _put(self, points: ArrayLike) -> None:
+    def _set_points(self, points: ArrayLike) -> None:
         """Makes the state anew from control points (n, 3), at rest."""
         shape = (self._spline.n_control_points, 3)
         try:
@@ -177,9 +177,15 @@ class SplineBody:
         if wanted.shape != shape or not np.all(np.isfinite(wanted)):
             valid = f"shape {shape}, all finite"
             raise InputError("shape of the control points", wanted.shape, valid)
-        self._spline.offset = self._spline.find_offset(wanted)
-        self._state = schemes.make_state(self._spline.size)
-        self._state.x[:] = self._spline.from_world(wanted)
+        self._spline.offset = self._spline.compute_offset(wanted)
+        state = integrators.make_state(self._spline.size)
+        state.x[:] = self._spline.from_world(wanted)
+        self._set_state(state)
+
+    def _set_state(self, state: integrators.State) -> None:
+        """Takes over a state; the arrays stay those that contacts and coupling read."""
+        for part, wanted in zip(self._state, state, strict=True):
+            part[:] = wanted
 
     def _evaluate(self, arc_length: ArrayLike, flat: Array, derivative: int = 0) -> Array:
         s = check_arc_lengths(arc_length, self.spec.length)

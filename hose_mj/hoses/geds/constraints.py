@@ -1,11 +1,11 @@
-"""`HoldSet`: the clamps and attachments of a hose, as rows of G x = g (thesis A.3).
+"""`ConstraintSet`: the clamps and attachments of a hose, as rows of G x = g (thesis A.3).
 
 An attachment is d rows, r(s) = position. A clamp has d - 1 more, r'(s) . e = 0 for unit vectors e
 across the wanted tangent: the hose may stretch through it, but not turn. The rows' multipliers are
 the forces that a hold does to the hose, in space and on r'. In space a clamp also holds the angle
 of the material about the tangent: by a row for theta where there is one, else by the twist of the
-stretch to the next clamp (stretches.py). What joins the ends of a closed loop stands behind all of
-them (loops.py).
+segment to the next clamp (twist_segments.py). What joins the ends of a closed loop stands behind
+all of them (loops.py).
 """
 
 from __future__ import annotations
@@ -18,10 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import loops
-from hose_mj.hoses.geds import newton as solver
-from hose_mj.hoses.geds import twist_segments as stretches
-from hose_mj.hoses.geds.frames import lay_frames
+from hose_mj.hoses.geds import loops, records, twist_segments
+from hose_mj.hoses.geds.frames import transport_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
@@ -30,7 +28,7 @@ from hose_mj.hoses.protocol import Array, Hold, Reaction
 from hose_mj.hoses.spec import check_number
 from hose_mj.jit import run_kernel
 
-_REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "kept")
+_REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "accepted")
 """What of the twist goes into a snapshot."""
 _FIRST_END, _LAST_END = -1, -2
 """Numbers of the clamps at s = 0 and s = L of a closed loop, which hold nothing (twist.py)."""
@@ -47,27 +45,28 @@ class _Held:
     first: int = 0  # its first row of G x = g
 
 
-class HoldSet:
+class ConstraintSet:
     """All holds of one hose.
 
     Args:
         spline: the hose's geometry.
         hose: its constants.
+        x: its unknowns, read whenever something changes.
 
     Attributes:
         rows: what the kernels read and write; made anew by every change.
         is_closed: whether the hose is a closed loop.
     """
 
-    def __init__(self, spline: Spline, hose: solver.Hose) -> None:
+    def __init__(self, spline: Spline, hose: records.Hose, x: Array) -> None:
         self._spline, self._hose = spline, hose
         self.is_closed = False
         self._held: list[_Held] = []
-        self._giving: list[Hold] = []
+        self._compliant: list[Hold] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
         self._n_made = 0
-        x = np.zeros(spline.size)
-        self.rows = self._make_rows_of_all(x, stretches.make_twist(spline, hose, [], x))
+        self._x = x
+        self.rows = self._make_rows(twist_segments.make_twist(spline, hose, [], x))
 
     @property
     def n_rows(self) -> int:
@@ -83,33 +82,29 @@ class HoldSet:
         """All holds, the oldest first."""
         return [held.hold for held in self._held]
 
-    def clear(self, x: Array, director: Array | None = None) -> None:
+    def clear(self, director: Array | None = None) -> None:
         """Drops all holds and opens a loop; numbers are not used again. The frames begin anew.
 
         Args:
-            x: the unknowns.
             director: of the material where the hose begins, (3,); any by default.
         """
         self._held, self._clamps, self.is_closed = [], [], False
-        twist = stretches.make_twist(self._spline, self._hose, [], x)
+        twist = twist_segments.make_twist(self._spline, self._hose, [], self._x)
         if self._spline.has_theta:
-            start = stretches.make_directors(self._spline, np.zeros(1), x)[0]
+            start = twist_segments.make_directors(self._spline, np.zeros(1), self._x)[0]
             twist.frames[0, 6:9] = start[3:] if director is None else director
             axes, tables = self._spline.axes, self._hose.tables
-            run_kernel(lay_frames, axes, tables, twist, x, make_span(), twist.frames)
-            twist.kept[:] = twist.frames
-        self.rows = self._make_rows_of_all(x, twist)
+            run_kernel(transport_frames, axes, tables, twist, self._x, make_span(), twist.frames)
+            twist.accepted[:] = twist.frames
+        self.rows = self._make_rows(twist)
 
-    def add(
-        self, arc_length: float, position: ArrayLike | None, tangent: Array | None, x: Array
-    ) -> Hold:
+    def add(self, arc_length: float, position: ArrayLike | None, tangent: Array | None) -> Hold:
         """Adds a hold.
 
         Args:
             arc_length: where on the hose (m).
             position: wanted place (3,) m; None for where the hose is now.
             tangent: wanted unit tangent (3,) of a clamp; None for an attachment.
-            x: the hose's unknowns.
 
         Raises:
             InputError: a place off the hose or that another hold is at, a position off its plane, a
@@ -124,18 +119,18 @@ class HoldSet:
             if apart < 1e-9 * spline.length:
                 raise InputError("arc_length", s, "a place that no other hold is at")
         if position is None:
-            point = spline.evaluate(np.array([s]), x)[0] + spline.offset
+            point = spline.evaluate(np.array([s]), self._x)[0] + spline.offset
         else:
             point = spline.check_position(position)
         if tangent is not None:
-            _check_ahead(tangent, spline.evaluate(np.array([s]), x, 1)[0])
+            _check_ahead(tangent, spline.evaluate(np.array([s]), self._x, 1)[0])
         hold = Hold(self._n_made, s, tangent is not None)
         n_rows = spline.dimension
         if tangent is not None:
             n_rows += spline.dimension - 1 + spline.has_theta
         self._n_made += 1
         self._held.append(_Held(hold, point, tangent, np.zeros(n_rows)))
-        self._rebuild(x)
+        self._rebuild()
         return hold
 
     def move(
@@ -144,7 +139,6 @@ class HoldSet:
         position: ArrayLike | None,
         tangent: ArrayLike | None,
         spin: float,
-        x: Array,
     ) -> None:
         """Sets where a hold is to be at the end of the next step; see `HoseModel.move`.
 
@@ -165,9 +159,9 @@ class HoldSet:
             _check_ahead(aim, held.tangent)
         held.position, held.tangent = point, aim
         if tangent is None:
-            self._aim(held, x)
+            self._aim(held)
         else:
-            self._rebuild(x)
+            self._rebuild()
         if spin != 0.0:
             self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
 
@@ -189,33 +183,33 @@ class HoldSet:
             raise InputError("director", vector.tolist(), "a vector across the tangent")
         return np.asarray(across / length)
 
-    def turn_to(self, hold: Hold, director: Array, x: Array) -> None:
+    def turn_to(self, hold: Hold, director: Array) -> None:
         """Lets the material at a clamp turn to a director within the next step."""
         held = self._find(hold)
         clamp, twist = self._clamps.index(hold.number), self.rows.twist
         assert held.tangent is not None
         if self._spline.has_theta:
             row = 3 * len(self._hose.tables.first) + clamp
-            theta = float(self._spline.evaluate_theta(np.array([hold.arc_length]), x)[0])
-            tangent, base = twist.kept[row, :3], twist.kept[row, 6:9]
+            theta = float(self._spline.evaluate_theta(np.array([hold.arc_length]), self._x)[0])
+            tangent, base = twist.accepted[row, :3], twist.accepted[row, 6:9]
             now = np.cos(theta) * base + np.sin(theta) * np.cross(tangent, base)
         else:
             tangent, now = twist.directors[clamp, :3], twist.directors[clamp, 3:]
-        now = stretches.carry_director(tangent, held.tangent, now)
+        now = twist_segments.transport_director(tangent, held.tangent, now)
         angle = float(np.arctan2(np.cross(now, director) @ held.tangent, now @ director))
         if self._spline.has_theta or len(self._clamps) > 1:
             twist.spin[clamp, 0] += angle
         else:
             # Nothing else knows the angle of a hose without theta.
-            stretches.turn_director(twist, clamp, angle)
+            twist_segments.turn_director(twist, clamp, angle)
 
-    def give_way(
+    def set_compliance(
         self,
         holds: Sequence[Hold],
         positions: ArrayLike | None = None,
         compliance: ArrayLike | None = None,
     ) -> np.ndarray:
-        """Lets attachments yield to the hose within the next step, see `Carried.try_step`.
+        """Sets the answer of bodies at attachments to the next step; see `BodyCoupling.try_step`.
 
         Returns:
             the first row of each, (k,). Without positions that is all it does.
@@ -223,15 +217,15 @@ class HoldSet:
         Raises:
             InputError: a clamp, a hold that is not here, wrong shapes, numbers that are not finite.
         """
-        if list(holds) != self._giving:
+        if list(holds) != self._compliant:
             for hold in holds:
                 if self._find(hold).tangent is not None:
                     raise InputError("hold", hold, "an attachment: a clamp on a body gives no way")
-            self._giving = list(holds)
-            self._giving_first = np.array([self._find(h).first for h in holds], dtype=np.int64)
+            self._compliant = list(holds)
+            self._compliant_first = np.array([self._find(h).first for h in holds], dtype=np.int64)
             d = self._spline.dimension
-            self._giving_rows = (self._giving_first[:, None] + np.arange(d)).ravel()
-            self.rows = self.rows._replace(response=solver.make_response(len(self.rows.start)))
+            self._compliant_rows = (self._compliant_first[:, None] + np.arange(d)).ravel()
+            self.rows = self.rows._replace(response=records.make_response(len(self.rows.start)))
         if positions is not None:
             k, dims = len(holds), self._spline.dims
             places, matrix = np.asarray(positions, float), np.asarray(compliance, float)
@@ -241,32 +235,32 @@ class HoldSet:
                 raise InputError("shapes of positions and compliance", shapes, valid)
             if not (np.isfinite(places).all() and np.isfinite(matrix).all()):
                 raise InputError("positions and compliance", places.tolist(), "finite numbers")
-            kept = (3 * np.arange(k)[:, None] + dims).ravel()
-            rows = self._giving_rows
+            within = (3 * np.arange(k)[:, None] + dims).ravel()
+            rows = self._compliant_rows
             self.rows.after[rows] = (places - self._spline.offset)[:, dims].ravel()
-            self.rows.response.compliance[rows[:, None], rows] = matrix[kept[:, None], kept]
-        return self._giving_first
+            self.rows.response.compliance[rows[:, None], rows] = matrix[within[:, None], within]
+        return self._compliant_first
 
-    def find_mean_forces(self) -> Array:
-        """Mean forces over the last step of the holds that give way, (k, 3), N, world frame."""
-        forces = np.zeros((len(self._giving), 3))
-        if not self._giving:
+    def compute_mean_forces(self) -> Array:
+        """Mean forces over the last step of the holds on bodies, (k, 3), N, world frame."""
+        forces = np.zeros((len(self._compliant), 3))
+        if not self._compliant:
             return forces
-        found = self.rows.response.force[self._giving_rows]
+        found = self.rows.response.force[self._compliant_rows]
         forces[:, self._spline.dims] = found.reshape(len(forces), -1)
         return forces
 
-    def find_positions(self, x: Array) -> Array:
-        """Where unknowns x put the holds that give way, (k, 3), m, world frame."""
-        places = np.array([hold.arc_length for hold in self._giving])
+    def compute_positions(self, x: Array) -> Array:
+        """Where unknowns x put the holds on bodies, (k, 3), m, world frame."""
+        places = np.array([hold.arc_length for hold in self._compliant])
         return self._spline.evaluate(places, x) + self._spline.offset
 
-    def release(self, hold: Hold, x: Array) -> None:
+    def release(self, hold: Hold) -> None:
         """Drops one hold; raises `InputError` for one that is not here."""
         self._held.remove(self._find(hold))
-        self._rebuild(x)
+        self._rebuild()
 
-    def close(self, spin: float, x: Array) -> None:
+    def close(self, spin: float) -> None:
         """Joins s = L to s = 0, its material turned by `spin` (rad) about the tangent before.
 
         Raises:
@@ -276,19 +270,20 @@ class HoldSet:
         check_number("spin", spin, may_be_negative=True)
         if spin != 0.0 and self._spline.dimension == 2:
             raise InputError("spin", spin, "0 for a hose in a plane")
-        loops.check_open(self.is_closed)
-        loops.check_ends(self._spline, [one.hold.arc_length for one in self._held], x)
+        if self.is_closed:
+            raise InputError.about("cannot close a hose that is closed: open it first")
+        loops.check_ends(self._spline, [one.hold.arc_length for one in self._held], self._x)
         self.is_closed = True
-        self._rebuild(x, spin)
+        self._rebuild(spin=spin)
 
-    def open(self, x: Array) -> None:
+    def open(self) -> None:
         """Parts the ends of a closed loop; raises `InputError` for a hose that is open."""
         if not self.is_closed:
-            raise InputError("open()", "an open hose", "a hose that was closed")
+            raise InputError.about("cannot open a hose that is not closed")
         self.is_closed = False
-        self._rebuild(x)
+        self._rebuild()
 
-    def reaction(self, hold: Hold, x: Array) -> Reaction:
+    def reaction(self, hold: Hold) -> Reaction:
         """Force and moment of a hold on the hose at the end of the last step, world frame."""
         held = self._find(hold)
         d = self._spline.dimension
@@ -297,7 +292,7 @@ class HoldSet:
         moment = np.zeros(3)
         if held.tangent is not None:
             # A force f on r' works like the moment r' x f.
-            slope = self._spline.evaluate(np.array([hold.arc_length]), x, 1)[0]
+            slope = self._spline.evaluate(np.array([hold.arc_length]), self._x, 1)[0]
             across = held.multipliers[d : 2 * d - 1] @ self._across(held.tangent)
             moment = np.cross(slope, across) + self._compute_torque(held) * held.tangent
         return Reaction(force, moment)
@@ -335,12 +330,12 @@ class HoldSet:
             "is_closed": self.is_closed,
             "before": before,
             "twist": twist,
-            "giving": [hold.number for hold in self._giving],
+            "compliant": [hold.number for hold in self._compliant],
             "mean_force": self.rows.response.force.copy(),
         }
 
-    def restore(self, state: dict[str, Any], x: Array) -> None:
-        """Returns to a snapshot; x are the control points of the same moment."""
+    def restore(self, state: dict[str, Any]) -> None:
+        """Returns to a snapshot."""
         self._held = [
             _Held(
                 Hold(one["number"], one["arc_length"], one["tangent"] is not None),
@@ -352,14 +347,14 @@ class HoldSet:
         ]
         self._n_made = max(self._n_made, state["n_made"])
         self.is_closed = state["is_closed"]
-        self._rebuild(x)
+        self._rebuild()
         self.rows.before[:] = state["before"]
         for name in _REMEMBERED:
             getattr(self.rows.twist, name)[:] = state["twist"][name]
-        self.rows.twist.frames[:] = self.rows.twist.kept
-        if state["giving"]:
+        self.rows.twist.frames[:] = self.rows.twist.accepted
+        if state["compliant"]:
             numbers = {one.hold.number: one.hold for one in self._held}
-            self.give_way([numbers[number] for number in state["giving"]])
+            self.set_compliance([numbers[number] for number in state["compliant"]])
             self.rows.response.force[:] = state["mean_force"]
 
     # -- inside --------------------------------------------------------------------------------
@@ -374,10 +369,10 @@ class HoldSet:
         """Unit vectors of the hose's space that are normal to a tangent, (d - 1, 3)."""
         if self._spline.dimension == 2:
             return np.cross(self._spline.normal, tangent)[None]
-        first = stretches.find_normal(tangent)
+        first = twist_segments.compute_normal(tangent)
         return np.stack([first, np.cross(tangent, first)])
 
-    def _rebuild(self, x: Array, spin: float = 0.0) -> None:
+    def _rebuild(self, spin: float = 0.0) -> None:
         """Makes everything anew from the list of holds; the material stays as it lies.
 
         `spin`: what the last end of a loop is turned by (rad).
@@ -392,29 +387,29 @@ class HoldSet:
             numbers = [_FIRST_END, *numbers, _LAST_END]
             places = [0.0, *places, self._spline.length]
         if self._spline.dimension == 2 or numbers == self._clamps:
-            self.rows = self._make_rows_of_all(x, self.rows.twist)
+            self.rows = self._make_rows(self.rows.twist)
             return
         same = {k: self._clamps.index(n) for k, n in enumerate(numbers) if n in self._clamps}
-        twist = stretches.make_twist(self._spline, self._hose, places, x)
+        twist = twist_segments.make_twist(self._spline, self._hose, places, self._x)
         if self._spline.has_theta:
             n_spans = len(self._hose.tables.first)
-            stretches.take_over_frames(twist, self.rows.twist, same, n_spans)
+            twist_segments.take_over_frames(twist, self.rows.twist, same, n_spans)
         else:
-            old = stretches.part_ends(self._spline, self._hose, self.rows.twist, x)
-            stretches.take_over_twist(self._spline, self._hose, twist, old, same, x)
+            old = twist_segments.part_ends(self._spline, self._hose, self.rows.twist, self._x)
+            twist_segments.take_over_twist(self._spline, self._hose, twist, old, same, self._x)
             if self.is_closed:
-                twist = stretches.join_ends(twist, spin)
-            stretches.settle(twist)
+                twist = twist_segments.join_ends(twist, spin)
+            twist_segments.settle(twist)
         self._clamps = numbers
-        self.rows = self._make_rows_of_all(x, twist)
+        self.rows = self._make_rows(twist)
 
-    def _make_rows_of_all(self, x: Array, twist: Twist) -> solver.Holds:
+    def _make_rows(self, twist: Twist) -> records.Constraints:
         """Makes the rows of G x = g: positions first, then slopes across, then theta.
 
         `before` is what x meets now, so a hold that was moved goes its way within the next step
         and not before it begins.
         """
-        d, width = self._spline.dimension, 4 * self._spline.stride
+        d, width = self._spline.dimension, 4 * self._spline.n_dof
         m = sum(len(held.multipliers) for held in self._held) + 2 * d * self.is_closed
         start = np.zeros(m, dtype=np.int64)
         coefficients = np.zeros((m, width * (1 + self.is_closed)))
@@ -424,8 +419,8 @@ class HoldSet:
             own = slice(first, first + len(held.multipliers))
             places, values = self._spline.compute_basis(np.array([held.hold.arc_length]))
             start[own] = places[0]
-            coefficients[own, :width] = self._make_rows(held, values[0])
-            before[own] = coefficients[own, :width] @ x[places[0] : places[0] + width]
+            coefficients[own, :width] = self._make_own_rows(held, values[0])
+            before[own] = coefficients[own, :width] @ self._x[places[0] : places[0] + width]
             after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
             if held.tangent is not None and self._spline.has_theta:
                 after[own.stop - 1] = before[own.stop - 1]
@@ -436,25 +431,25 @@ class HoldSet:
             first = own.stop
         if self.is_closed:
             coefficients[first:] = loops.make_joint_rows(self._spline)
-            before[first:] = coefficients[first:, :width] @ x[:width]
-            before[first:] += coefficients[first:, width:] @ x[-width:]
-        self._giving = []
-        response = solver.make_response(0)
-        return solver.Holds(start, coefficients, before, after, multipliers, twist, response)
+            before[first:] = coefficients[first:, :width] @ self._x[:width]
+            before[first:] += coefficients[first:, width:] @ self._x[-width:]
+        self._compliant = []
+        response = records.make_response(0)
+        return records.Constraints(start, coefficients, before, after, multipliers, twist, response)
 
-    def _aim(self, held: _Held, x: Array) -> None:
+    def _aim(self, held: _Held) -> None:
         """What `_rebuild` does for a hold of which only the position has changed."""
         d, rows = self._spline.dimension, self.rows
         own = slice(held.first, held.first + len(held.multipliers))
-        start, width = rows.start[held.first], 4 * self._spline.stride
-        rows.before[own] = rows.rows[own, :width] @ x[start : start + width]
+        start, width = rows.start[held.first], 4 * self._spline.n_dof
+        rows.before[own] = rows.rows[own, :width] @ self._x[start : start + width]
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
 
-    def _make_rows(self, held: _Held, values: Array) -> Array:
+    def _make_own_rows(self, held: _Held, values: Array) -> Array:
         """Coefficients of one hold's rows from the basis there (3, 4)."""
-        d, stride = self._spline.dimension, self._spline.stride
-        rows = np.zeros((len(held.multipliers), 4, stride))
+        d, n_dof = self._spline.dimension, self._spline.n_dof
+        rows = np.zeros((len(held.multipliers), 4, n_dof))
         for c in range(d):
             rows[c, :, c] = values[0]
         if held.tangent is not None:
@@ -462,7 +457,7 @@ class HoldSet:
                 rows[d + k, :, :d] = np.outer(values[1], direction[self._spline.dims])
             if self._spline.has_theta:
                 rows[-1, :, 3] = values[0]
-        return rows.reshape(len(rows), 4 * stride)
+        return rows.reshape(len(rows), 4 * n_dof)
 
 
 def _check_ahead(aim: Array, now: Array) -> None:

@@ -57,7 +57,7 @@ class Contact(NamedTuple):
 
 
 @kernel
-def evaluate(axes, points, q, start, x):  # type: ignore[no-untyped-def]
+def evaluate(axes, points, q, start, x):
     """sum_i N_i x_i at contact point q as three coordinates; a planar hose's last is 0."""
     d = len(axes)
     n0, n1, n2, n3 = points[q, 0], points[q, 1], points[q, 2], points[q, 3]
@@ -72,7 +72,7 @@ def evaluate(axes, points, q, start, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _find_surface_velocity(geoms, g, point):  # type: ignore[no-untyped-def]
+def _compute_surface_velocity(geoms, g, point):
     """Velocity of the geom's material at a point."""
     d0 = point[0] - geoms[g, POSITION]
     d1 = point[1] - geoms[g, POSITION + 1]
@@ -86,7 +86,7 @@ def _find_surface_velocity(geoms, g, point):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def make_push(width, gap):  # type: ignore[no-untyped-def]
+def make_push(width, gap):
     """The ramp S of a gap (m) and its slope by the depth."""
     depth = max(width - gap, 0.0)
     if depth < 2.0 * width:
@@ -95,7 +95,7 @@ def make_push(width, gap):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def compute_force(law, scale, gap, normal, friction, velocity):  # type: ignore[no-untyped-def]
+def compute_force(law, scale, gap, normal, friction, velocity):
     """Force per length on the hose.
 
     Args:
@@ -130,7 +130,7 @@ def compute_force(law, scale, gap, normal, friction, velocity):  # type: ignore[
 
 
 @kernel
-def find_gap(axes, contact, q, g, start, x):  # type: ignore[no-untyped-def]
+def compute_gap(axes, contact, q, g, start, x):
     """Gap, normal, curvature, friction and surface velocity at contact point q and geom g.
 
     Geom -1 stands for the distances handed in: planes through the points nearest then.
@@ -151,13 +151,13 @@ def find_gap(axes, contact, q, g, start, x):  # type: ignore[no-untyped-def]
         point[1] - distance * normal[1],
         point[2] - distance * normal[2],
     )
-    surface = _find_surface_velocity(geoms, g, foot)
+    surface = _compute_surface_velocity(geoms, g, foot)
     gap = distance - contact.law[RADIUS]
     return gap, normal, (bend, axis), geoms[g, FRICTION], surface
 
 
 @kernel
-def is_skipped(contact, q, g):  # type: ignore[no-untyped-def]
+def is_skipped(contact, q, g):
     """Whether contact point q is on the part of the hose that does not touch geom g."""
     if g < 0:
         return False
@@ -165,7 +165,7 @@ def is_skipped(contact, q, g):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def is_span_near(axes, contact, e, g, x):  # type: ignore[no-untyped-def]
+def is_span_near(axes, contact, e, g, x):
     """Whether span e may touch geom g: its curve lies within the hull of four control points."""
     if g < 0:
         return True

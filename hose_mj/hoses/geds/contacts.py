@@ -1,4 +1,4 @@
-"""`ContactSet`: the obstacles of one hose and the contact law, as the kernels read them."""
+"""`ContactSet`: what a hose may touch and what it feels there, `hose.contacts`; see contact.py."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, contact, contact_law, shapes
-from hose_mj.hoses.geds.capsules import Capsules
+from hose_mj.hoses.geds.integrators import State
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.obstacles import MOST_POINTS, SINK, ContactLaw, Obstacle
-from hose_mj.hoses.protocol import Array
-from hose_mj.hoses.spec import HoseSpec
+from hose_mj.hoses.protocol import Array, Reaction
+from hose_mj.hoses.spec import HoseSpec, check_number
 from hose_mj.jit import run_kernel
 
 _CODES = {
@@ -32,138 +32,108 @@ of the way that the slip speed goes in a step."""
 
 
 class ContactSet:
-    """What one hose may touch.
+    """Obstacles, distances handed in and a neighbouring hose, with the contact law.
 
     Args:
         spline: the hose's geometry.
         spec: the hose.
         gravity: (3,) m/s^2, for the default stiffness.
         timestep: s, for the tolerance.
+        state: the hose's, read where forces are asked for.
+        scheme: the hose's integrator: contact is too stiff for an explicit one.
 
     Attributes:
-        contact: what the kernels read; made anew by every change.
-        obstacles: the shapes, in the order of their numbers.
-        law: as given.
-        arc_lengths: where contact is looked for, (Q,), m.
+        contact: what the kernels read; made anew by every change but a move.
+        obstacles: the shapes; their places here are the numbers that `move_obstacle` takes.
+        law: numbers of the contact law.
+        arc_lengths: where along the hose contact is looked for, (Q,), m.
         order: the world axes in the order of the hose's coordinates.
     """
 
-    def __init__(self, spline: Spline, spec: HoseSpec, gravity: Array, timestep: float) -> None:
+    contact: contact_law.Contact
+    obstacles: tuple[Obstacle, ...]
+    arc_lengths: Array
+    _points: Array
+
+    def __init__(
+        self,
+        spline: Spline,
+        spec: HoseSpec,
+        gravity: Array,
+        timestep: float,
+        state: State,
+        scheme: str = "bdf2",
+    ) -> None:
         self._spline, self._spec, self._timestep = spline, spec, timestep
+        self._state, self._scheme = state, scheme
+        # Without gravity a hose is still pressed against things: as if by its weight on Earth.
         self._pull = max(9.81, float(np.linalg.norm(gravity)))
         self._is_closed = False
         # The hose's coordinates first: a reflection where that is an odd permutation.
         rest = [c for c in range(3) if c not in spline.dims]
         self.order = [*spline.dims, *rest]
         self._parity = float(np.linalg.det(np.eye(3)[self.order]))
-        self.set((), ContactLaw())
+        self._set((), ContactLaw())
 
-    def set(self, obstacles: Sequence[Obstacle], law: ContactLaw) -> None:
-        """Replaces obstacles and law; drops distances handed in."""
+    # -- what may be touched ---------------------------------------------------------------------
+
+    def set_obstacles(self, obstacles: Sequence[Obstacle], law: ContactLaw | None = None) -> None:
+        """Replaces what the hose may touch; it stays through `reset`. An empty list costs nothing.
+
+        Drops distances handed in and the neighbour.
+
+        Args:
+            obstacles: rigid shapes.
+            law: numbers of the contact law; None for the defaults.
+
+        Raises:
+            InputError: something that is not an obstacle; the explicit scheme.
+        """
+        self._check_implicit()
         for obstacle in obstacles:
             if not isinstance(obstacle, Obstacle):
                 raise InputError("obstacles", obstacle, "records of the class Obstacle")
-        self.obstacles, self.law = tuple(obstacles), law
-        self._given = np.zeros((0, contact_law.GIVEN))
-        self._capsules = np.zeros((0, shapes.ROW))
-        self._numbers = self._make_law()
-        self.arc_lengths, self._points = self._make_points()
-        self.rebuild()
+        self._set(obstacles, law or ContactLaw())
 
-    def move(self, number: int, changes: dict[str, Any]) -> None:
-        """Replaces placement or velocities of one obstacle; None leaves a thing as it is."""
+    def add_floor(self, height: float = 0.0, friction: float = 0.5) -> int:
+        """Adds a horizontal floor below the hose at z = height (m); returns its number."""
+        floor = Obstacle(kind="plane", position=(0.0, 0.0, height), friction=friction)
+        self.set_obstacles([*self.obstacles, floor], self.law)
+        return len(self.obstacles) - 1
+
+    def move_obstacle(
+        self,
+        number: int,
+        position: ArrayLike | None = None,
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        angular_velocity: ArrayLike | None = None,
+    ) -> None:
+        """Sets where an obstacle is at the end of the next step, and how fast; see `Obstacle`.
+
+        Only the velocities that are given rub: they are not derived from the places.
+
+        Raises:
+            InputError: a number that no obstacle has, a value outside its range.
+        """
         check_count("obstacle", number, 0, len(self.obstacles) - 1)
-        wanted = {name: value for name, value in changes.items() if value is not None}
+        changes = {"position": position, "rotation": rotation}
+        changes |= {"velocity": velocity, "angular_velocity": angular_velocity}
+        wanted: dict[str, Any] = {name: v for name, v in changes.items() if v is not None}
         moved = replace(self.obstacles[number], **wanted)
         self.obstacles = (*self.obstacles[:number], moved, *self.obstacles[number + 1 :])
         self.contact.geoms[number] = self._make_row(moved)
 
-    def set_distances(
-        self,
-        distances: ArrayLike,
-        normals: ArrayLike,
-        friction: ArrayLike,
-        velocity: ArrayLike,
-        x: Array,
+    def place_obstacles(
+        self, numbers: np.ndarray, positions: Array, rotations: Array, twists: Array
     ) -> None:
-        """Hands in the nearest surface at each contact point, see `Touching.set_distances`."""
-        q = len(self.arc_lengths)
-        given = np.zeros((q, contact_law.GIVEN))
-        turned = np.asarray(normals, dtype=np.float64)
-        speeds = np.asarray(velocity, dtype=np.float64)
-        try:
-            given[:, 0] = distances
-            given[:, 1:4] = turned[..., self.order]
-            given[:, 4] = friction
-            given[:, 5:8] = speeds[..., self.order]
-        except (TypeError, ValueError, IndexError):
-            valid = f"distances ({q},), normals and velocities ({q}, 3), friction ({q},)"
-            raise InputError("shapes of the distances", np.shape(distances), valid) from None
-        if not np.all(np.isfinite(given)) or np.any(given[:, 4] < 0.0):
-            raise InputError("distances", distances, "finite numbers, friction at or above 0")
-        place = self._spline.evaluate(self.arc_lengths, x)
-        given[:, 8:11] = place[:, self.order]
-        self._given = given
-        self.rebuild()
-
-    def set_closed(self, is_closed: bool) -> None:
-        """Says whether the hose is a closed loop, whose ends do not touch each other."""
-        self._is_closed = is_closed
-        self._numbers = self._make_law()
-        self.rebuild()
-
-    def drop_distances(self) -> None:
-        """Forgets distances handed in."""
-        self._given = np.zeros((0, contact_law.GIVEN))
-        self.rebuild()
-
-    def set_capsules(self, capsules: Capsules | None) -> None:
-        """Replaces the capsules that stand for another hose; None for none."""
-        order, offset = self.order, self._spline.offset
-        if capsules is None:
-            self._capsules = np.zeros((0, shapes.ROW))
-        else:
-            scale = capsules.stiffness / self._numbers[contact_law.STIFFNESS]
-            self._capsules = capsules.make_rows(order, offset, scale)
-        self.rebuild()
-
-    def rebuild(self) -> None:
-        """Makes what the kernels read; to be called where the plane of the hose has moved."""
-        geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
-        room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
-        self.contact = contact_law.Contact(
-            self._points, geoms, self._given, self._numbers, self.arc_lengths, room
-        )
-
-    def find_stiffness(self) -> float:
-        """Stiffness of the law with its damping over a step, N/m^2."""
-        damping = 2.0 * self._numbers[contact_law.DAMPING] / self._timestep
-        return float(self._numbers[contact_law.STIFFNESS] * (1.0 + damping))
-
-    def make_shapes(self, obstacles: Sequence[Obstacle]) -> Array:
-        """Returns obstacles as kernels read them, rows of shapes.py, (G, ROW)."""
-        rows = np.zeros((len(obstacles), shapes.ROW))
-        for row, obstacle in zip(rows, obstacles, strict=True):
-            row[:] = self._make_row(obstacle)
-        return rows
-
-    def measure(self, points: Array) -> Array:
-        """Signed distances of points (k, 3), m, world frame, from the obstacles, (G, k), m."""
-        local = np.ascontiguousarray((points - self._spline.offset)[:, self.order])
-        found = np.zeros((len(self.obstacles), len(points)))
-        normals = np.zeros_like(local)
-        for g, row in enumerate(found):
-            shapes.measure_points(self.contact.geoms, g, local, row, normals)
-        return found
-
-    def place(self, numbers: np.ndarray, positions: Array, rotations: Array, twists: Array) -> None:
-        """Moves some obstacles (k,) at once, without checks; `obstacles` keeps what was set.
+        """Moves obstacles at once and unchecked, for worlds; `obstacles` keeps what was set.
 
         Args:
-            numbers: of the obstacles.
-            positions: (k, 3), m.
+            numbers: of the obstacles, (k,).
+            positions: of each at the end of the next step, (k, 3), m.
             rotations: (k, 3, 3).
-            twists: velocities and angular velocities, (k, 6), m/s, rad/s.
+            twists: velocity and angular velocity, (k, 6), m/s, rad/s.
         """
         rows, order, k = self.contact.geoms, self.order, len(numbers)
         at = shapes.POSITION
@@ -175,46 +145,151 @@ class ContactSet:
         at = shapes.SPIN
         rows[numbers, at : at + 3] = self._parity * twists[:, 3:][:, order]
 
+    def set_distances(
+        self,
+        distances: ArrayLike | None,
+        normals: ArrayLike = (0.0, 0.0, 1.0),
+        friction: ArrayLike = 0.5,
+        velocities: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Hands in signed distances for the steps to come, for shapes that are no `Obstacle`.
+
+        They are kept fixed until the next call: hand in fresh ones before each step.
+
+        Args:
+            distances: from the centre line at `arc_lengths` to the surface, (Q,), m; above a radius
+                for no contact. None for none.
+            normals: outward unit normals there, (Q, 3) or one for all.
+            friction: coefficients, (Q,) or one.
+            velocities: of the surface, (Q, 3) or one, m/s.
+
+        Raises:
+            InputError: a wrong shape, a number that is not finite; the explicit scheme.
+        """
+        self._check_implicit()
+        q = 0 if distances is None else len(self.arc_lengths)
+        given = np.zeros((q, contact_law.GIVEN))
+        if distances is not None:
+            turned = np.asarray(normals, dtype=np.float64)
+            speeds = np.asarray(velocities, dtype=np.float64)
+            try:
+                given[:, 0] = distances
+                given[:, 1:4] = turned[..., self.order]
+                given[:, 4] = friction
+                given[:, 5:8] = speeds[..., self.order]
+            except (TypeError, ValueError, IndexError):
+                valid = f"distances ({q},), normals and velocities ({q}, 3), friction ({q},)"
+                raise InputError("shapes of the distances", np.shape(distances), valid) from None
+            if not np.all(np.isfinite(given)) or np.any(given[:, 4] < 0.0):
+                raise InputError("distances", distances, "finite numbers, friction at or above 0")
+            place = self._spline.evaluate(self.arc_lengths, self._state.x)
+            given[:, 8:11] = place[:, self.order]
+        self._given = given
+        self._rebuild()
+
+    def set_neighbour(
+        self,
+        points: ArrayLike,
+        velocities: ArrayLike,
+        radius: float,
+        friction: float,
+        stiffness: float,
+    ) -> None:
+        """Hands in another hose as moving capsules, for the steps to come; see `HosePair`.
+
+        Args:
+            points: ends of the capsules (m + 1, 3), m.
+            velocities: of these ends (m + 1, 3), m/s.
+            radius: m.
+            friction: Coulomb's coefficient.
+            stiffness: of this contact (N/m^2); the rest of the law is the hose's.
+
+        Raises:
+            InputError: a wrong shape or a value outside its range; the explicit scheme.
+        """
+        self._check_implicit()
+        places = np.asarray(points, dtype=np.float64)
+        speeds = np.asarray(velocities, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1:] != (3,) or len(places) < 2:
+            raise InputError("shape of the neighbour", places.shape, "(m + 1, 3) with m >= 1")
+        if speeds.shape != places.shape:
+            raise InputError("shape of the neighbour's velocities", speeds.shape, str(places.shape))
+        if not np.all(np.isfinite(places)) or not np.all(np.isfinite(speeds)):
+            raise InputError("neighbour", places, "finite places and velocities")
+        check_number("radius", radius)
+        check_number("friction", friction, may_be_zero=True)
+        check_number("stiffness", stiffness)
+        ends = (places - self._spline.offset)[:, self.order]
+        self._capsules = _make_capsules(ends, speeds[:, self.order], radius)
+        self._capsules[:, shapes.FRICTION] = friction
+        self._capsules[:, shapes.SCALE] = stiffness / self._numbers[contact_law.STIFFNESS]
+        self._rebuild()
+
+    def set_closed(self, is_closed: bool) -> None:
+        """Says whether the hose is a closed loop, whose ends do not touch each other."""
+        self._is_closed = is_closed
+        self._numbers = self._make_law()
+        self._rebuild()
+
+    def compute_stiffness(self) -> float:
+        """What a contact's force per length grows by with the depth within one step, N/m^2.
+
+        Its damping counts as what it adds to that in an implicit step.
+        """
+        damping = 2.0 * self._numbers[contact_law.DAMPING] / self._timestep
+        return float(self._numbers[contact_law.STIFFNESS] * (1.0 + damping))
+
+    def make_shapes(self, obstacles: Sequence[Obstacle]) -> Array:
+        """Returns obstacles as kernels read them, rows of shapes.py, (G, ROW)."""
+        rows = np.zeros((len(obstacles), shapes.ROW))
+        for row, obstacle in zip(rows, obstacles, strict=True):
+            row[:] = self._make_row(obstacle)
+        return rows
+
+    def measure_obstacles(self, points: ArrayLike) -> Array:
+        """Signed distances of points (k, 3), m, from each obstacle, (G, k), m.
+
+        Raises:
+            InputError: points that are not finite or of another shape.
+        """
+        places = np.asarray(points, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
+            raise InputError("points", places.shape, "finite numbers, shape (k, 3)")
+        local = np.ascontiguousarray((places - self._spline.offset)[:, self.order])
+        found = np.zeros((len(self.obstacles), len(places)))
+        normals = np.zeros_like(local)
+        for g, row in enumerate(found):
+            shapes.measure_points(self.contact.geoms, g, local, row, normals)
+        return found
+
     # -- forces ----------------------------------------------------------------------------------
 
-    def compute_forces(self, x: Array, v: Array) -> tuple[Array, Array]:
-        """Returns forces on the hose (Q, 3) and on the geoms (G, 6) in the hose's coordinates."""
-        forces = np.zeros((len(self._points), 3))
-        reactions = np.zeros((len(self.contact.geoms), 6))
-        run_kernel(
-            *(contact.compute_forces, self._spline.axes, self.contact, x, v, forces, reactions)
-        )
-        return forces, reactions
+    def compute_forces(self) -> Array:
+        """Contact forces on the hose at `arc_lengths`, (Q, 3), N, world frame."""
+        return self._to_world(self._compute_local(self.contact)[0])
 
-    def compute_world_forces(self, x: Array, v: Array) -> Array:
-        """Returns the forces on the hose at the contact points (Q, 3), N, world frame."""
-        return self._to_world(self.compute_forces(x, v)[0])
-
-    def compute_given_forces(self, x: Array, v: Array) -> Array:
-        """Returns the forces on the hose of the distances handed in (Q, 3), N, world frame."""
-        forces = np.zeros((len(self._points), 3))
+    def compute_given_forces(self) -> Array:
+        """The part of `compute_forces` that comes from distances handed in, (Q, 3), N."""
         alone = self.contact._replace(geoms=np.zeros((0, shapes.ROW)))
-        run_kernel(
-            *(contact.compute_forces, self._spline.axes, alone, x, v, forces, np.zeros((0, 6)))
-        )
-        return self._to_world(forces)
+        return self._to_world(self._compute_local(alone)[0])
 
-    def compute_reactions(self, x: Array, v: Array) -> Array:
-        """Returns what the hose does to each obstacle, (G, 6): force (N), moment (N m) about it."""
-        found = self.compute_forces(x, v)[1][: len(self.obstacles)]
-        forces = self._to_world(found[:, :3])
-        moments = self._parity * self._to_world(found[:, 3:])
-        return np.concatenate([forces, moments], axis=1)
+    def compute_reactions(self) -> Array:
+        """What the hose does to each obstacle, (G, 6): force (N), moment about its position."""
+        found = self._compute_local(self.contact)[1][: len(self.obstacles)]
+        return np.concatenate(self._split(found), axis=1)
 
-    def compute_capsule_forces(self, x: Array, v: Array) -> Array:
-        """Returns what the hose does to the ends of the capsules, (m + 1, 3), N, world frame.
+    def list_reactions(self) -> list[Reaction]:
+        """`compute_reactions` as one record for each obstacle."""
+        return [Reaction(row[:3], row[3:]) for row in self.compute_reactions()]
+
+    def compute_neighbour_forces(self) -> Array:
+        """What the hose does to the ends of the neighbour's capsules, (m + 1, 3), N, world frame.
 
         A moment about a capsule's middle becomes a couple of forces at its ends; what lies along
         its axis is lost.
         """
-        found = self.compute_forces(x, v)[1][len(self.obstacles) :]
-        forces = self._to_world(found[:, :3])
-        moments = self._parity * self._to_world(found[:, 3:])
+        found = self._compute_local(self.contact)[1][len(self.obstacles) :]
+        forces, moments = self._split(found)
         turned = self._capsules[:, shapes.ROTATION + 2 : shapes.ROTATION + 9 : 3]
         axes = self._to_world(turned) * (2.0 * self._capsules[:, [shapes.SIZE + 1]])
         couple = np.cross(moments, axes) / np.sum(axes**2, axis=1, keepdims=True)
@@ -238,12 +313,45 @@ class ContactSet:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot."""
-        self.set([Obstacle(**one) for one in state["obstacles"]], ContactLaw(**state["law"]))
+        self._set([Obstacle(**one) for one in state["obstacles"]], ContactLaw(**state["law"]))
         self._given = state["given"].copy()
         self._capsules = state["capsules"].copy()
-        self.rebuild()
+        self._rebuild()
 
     # -- inside ----------------------------------------------------------------------------------
+
+    def _check_implicit(self) -> None:
+        if self._scheme == "verlet":
+            valid = "an implicit scheme for a hose with obstacles"
+            raise InputError("scheme", self._scheme, valid)
+
+    def _set(self, obstacles: Sequence[Obstacle], law: ContactLaw) -> None:
+        self.obstacles, self.law = tuple(obstacles), law
+        self._given = np.zeros((0, contact_law.GIVEN))
+        self._capsules = np.zeros((0, shapes.ROW))
+        self._numbers = self._make_law()
+        self.arc_lengths, self._points = self._make_points()
+        self._rebuild()
+
+    def _rebuild(self) -> None:
+        """Makes what the kernels read."""
+        geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
+        room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
+        self.contact = contact_law.Contact(
+            self._points, geoms, self._given, self._numbers, self.arc_lengths, room
+        )
+
+    def _compute_local(self, touched: contact_law.Contact) -> tuple[Array, Array]:
+        """Forces on the hose (Q, 3) and on the geoms (G, 6) in the hose's coordinates."""
+        forces = np.zeros((len(self._points), 3))
+        reactions = np.zeros((len(touched.geoms), 6))
+        x, v = self._state.x, self._state.v
+        run_kernel(contact.compute_forces, self._spline.axes, touched, x, v, forces, reactions)
+        return forces, reactions
+
+    def _split(self, rows: Array) -> tuple[Array, Array]:
+        """Forces and moments (k, 3) in the world frame from the geoms' rows (k, 6)."""
+        return self._to_world(rows[:, :3]), self._parity * self._to_world(rows[:, 3:])
 
     def _make_law(self) -> Array:
         law, spec = self.law, self._spec
@@ -304,3 +412,27 @@ class ContactSet:
 
 def _copy(value: Any) -> Any:
     return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def _make_capsules(ends: Array, speeds: Array, radius: float) -> Array:
+    """Rows of shapes.py (m, ROW) of capsules joined at their ends (m + 1, 3), without friction."""
+    chords = np.diff(ends, axis=0)
+    # No length: an axis of zeros would have no normal.
+    lengths = np.maximum(np.linalg.norm(chords, axis=1, keepdims=True), 1e-12)
+    axes = chords / lengths
+    away = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
+    first = np.cross(axes, away)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    rows = np.zeros((len(chords), shapes.ROW))
+    rows[:, shapes.KIND] = shapes.CAPSULE
+    rows[:, shapes.SIZE] = radius
+    rows[:, shapes.SIZE + 1] = 0.5 * lengths[:, 0]
+    rows[:, shapes.BOUND] = radius + 0.5 * lengths[:, 0]
+    rows[:, shapes.POSITION : shapes.POSITION + 3] = 0.5 * (ends[1:] + ends[:-1])
+    for column, axis in enumerate((first, np.cross(axes, first), axes)):
+        rows[:, shapes.ROTATION + column : shapes.ROTATION + 9 : 3] = axis
+    rows[:, shapes.VELOCITY : shapes.VELOCITY + 3] = 0.5 * (speeds[1:] + speeds[:-1])
+    turn = np.cross(axes, np.diff(speeds, axis=0)) / lengths
+    rows[:, shapes.SPIN : shapes.SPIN + 3] = turn
+    rows[:, shapes.SKIP_FROM], rows[:, shapes.SKIP_TO] = np.inf, -np.inf
+    return rows

@@ -2,7 +2,10 @@
 
 With a = r', b = r'' (derivatives by rest arc length):
 
-* bending: bending.py for a hose that bends alike in every direction, at three Gauss points a span;
+* bending of a hose that bends alike in every direction: W = EI/2 |kb|^2 a length, with
+  kb = a x b / |a|^2 the curvature vector of the material, at three Gauss points a span. With
+  A = a.a, B = b.b, C = a.b it is |kb|^2 = (A B - C^2) / A^2. No Frenet frame: smooth where the hose
+  is straight. A rest curvature is signed here, for a hose in a plane;
 * twist: twist.py for that hose, rod.py (with theta as fourth unknown) for all others; frenet.py for
   the literal strain of GEDS, with theta as well;
 * stretching: EA h/2 (mean of |a| - 1 over the span)^2. The mean instead of the pointwise strain
@@ -16,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.hoses.geds.basis import find_kind
-from hose_mj.hoses.geds.bending import add_bending_viscosity, add_rest_curvature, set_bending
 from hose_mj.hoses.geds.frames import move_clamp_frames
+from hose_mj.hoses.geds.frenet import add_frenet, compute_frenet_energy
 from hose_mj.hoses.geds.rod import compute_rod_strains, set_rod
 from hose_mj.hoses.geds.span import (
     compute_derivatives,
@@ -26,13 +29,12 @@ from hose_mj.hoses.geds.span import (
     load_rates,
     load_span,
 )
-from hose_mj.hoses.geds.twist import add_twist, close_stretches, open_stretches
+from hose_mj.hoses.geds.twist import add_twist, close_segments, open_segments
 from hose_mj.jit import choose_by_unknowns, inlined, kernel
-from hose_mj.validation.frenet import add_frenet, compute_frenet_energy
 
 
 @kernel
-def compute_strains(axes, tables, elasticity, x, p, strains):  # type: ignore[no-untyped-def]
+def compute_strains(axes, tables, elasticity, x, p, strains):
     """Writes mean stretch strain and linear mode of each span, less the rest strain, (S, 2).
 
     The linear mode is kept at zero but in the first and last span.
@@ -51,7 +53,7 @@ def compute_strains(axes, tables, elasticity, x, p, strains):  # type: ignore[no
 
 
 @kernel
-def compute_energy(axes, tables, elasticity, frames, x, p, strains):  # type: ignore[no-untyped-def]
+def compute_energy(axes, tables, elasticity, frames, x, p, strains):
     """Returns stretching, bending and, for a hose with theta, twisting energy (J).
 
     Overwrites `strains` (S, 2) and moves the frames along.
@@ -87,7 +89,7 @@ def compute_energy(axes, tables, elasticity, frames, x, p, strains):  # type: ig
 
 
 @inlined
-def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped-def]
+def _add_tension(axes, g, weight, tension, exact, p):
     """Adds force and, scaled by `exact`, geometric stiffness of a tension (N) at Gauss point g."""
     a = p.a
     slope = 2.0 * weight * tension * p.stretches[g, 1]
@@ -100,7 +102,7 @@ def _add_tension(axes, g, weight, tension, exact, p):  # type: ignore[no-untyped
 
 
 @inlined
-def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # type: ignore[no-untyped-def]
+def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):
     """Adds the span's force to the gradient and its stiffness to the band."""
     d = len(axes)
     start = e * d
@@ -130,7 +132,7 @@ def _scatter(axes, tables, e, axial, has_linear_mode, p, gradient, band):  # typ
 
 
 @inlined
-def _scatter_force(by_a, by_b, e, d, c, p, gradient):  # type: ignore[no-untyped-def]
+def _scatter_force(by_a, by_b, e, d, c, p, gradient):
     """Adds the force on unknown c of the span's control points, a and b made with these tables."""
     a0, a1, a2 = p.force[0, 0, c], p.force[1, 0, c], p.force[2, 0, c]
     b0, b1, b2 = p.force[0, 1, c], p.force[1, 1, c], p.force[2, 1, c]
@@ -141,7 +143,7 @@ def _scatter_force(by_a, by_b, e, d, c, p, gradient):  # type: ignore[no-untyped
 
 
 @inlined
-def _add_block(d, start, c1, c2, block, band):  # type: ignore[no-untyped-def]
+def _add_block(d, start, c1, c2, block, band):
     """Adds the block (16,) of unknowns c1 >= c2 of four control points to the band."""
     for i in range(4):
         for j in range(i + 1):
@@ -153,7 +155,7 @@ def _add_block(d, start, c1, c2, block, band):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _scatter_turn(tables, e, p, band):  # type: ignore[no-untyped-def]
+def _scatter_turn(tables, e, p, band):
     """Adds the stiffness of theta, alone and with the place, to the band."""
     block = p.block
     q = tables.turn_products
@@ -179,7 +181,7 @@ def _scatter_turn(tables, e, p, band):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _add_outer(mode, c1, c2, axial, p):  # type: ignore[no-untyped-def]
+def _add_outer(mode, c1, c2, axial, p):
     """Adds a strain mode's rank-one stiffness to the block of coordinates c1, c2."""
     m0, m1 = p.modes[mode, c2, 0], p.modes[mode, c2, 1]
     m2, m3 = p.modes[mode, c2, 2], p.modes[mode, c2, 3]
@@ -192,19 +194,134 @@ def _add_outer(mode, c1, c2, axial, p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _set_isotropic(axes, elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[no-untyped-def]
-    """Sets force and stiffness of Gauss point g of a hose that bends alike in every direction."""
-    tau = elasticity.damping_time
-    bending = weight * elasticity.bending_stiffness[e, g]
-    set_bending(axes[:3], g, bending, exact, (1.0 - exact) + tau / step, p)
-    if tau != 0.0:
-        add_bending_viscosity(axes[:3], g, bending * tau, p)
-    if len(axes) == 2 and elasticity.rest_curvature[e, g] != 0.0:
-        add_rest_curvature(g, -bending * elasticity.rest_curvature[e, g], exact, p)
+def _set_bending(axes, g, weight, exact, viscous, p):
+    """Sets force and stiffness of Gauss point g to `weight` (EI times length) times bending.
+
+    `exact` scales the Hessian of |kb|^2 / 2, `viscous` its Gauss-Newton part J^T J with
+    J = (1 - t t^T) d kb, the change of kb that a turn of the tangent alone does not explain.
+    """
+    a = p.a
+    b = p.b
+    A = 0.0
+    B = 0.0
+    C = 0.0
+    for c in range(len(axes)):
+        A += a[g, c] * a[g, c]
+        B += b[g, c] * b[g, c]
+        C += a[g, c] * b[g, c]
+    P, s, P2 = compute_inverse_square(A)
+    P1 = 2.0 * s * P
+    D = max(A * B - C * C, 0.0)
+    for c in range(len(axes)):
+        p.force[g, 0, c] = weight * (P * (B * a[g, c] - C * b[g, c]) + D * P1 * a[g, c])
+        p.force[g, 1, c] = weight * P * (A * b[g, c] - C * a[g, c])
+    # Coefficients of I, a a^T, a b^T, b a^T, b b^T in the blocks (a, a) and (a, b).
+    both = weight * (exact + viscous) * P
+    exact *= weight
+    viscous *= weight * P
+    aa_1 = exact * (B * P + D * P1) + viscous * (B + s * D)
+    aa_aa = exact * (4.0 * B * P1 + 2.0 * D * P2) + viscous * (3.0 * s * B + 4.0 * s * s * D)
+    aa_ab = -C * (2.0 * exact * P1 + viscous * s)
+    aa_bb = -exact * P - viscous * (1.0 + s * A)
+    ab_aa = -2.0 * C * (exact * P1 + viscous * s)
+    ab_ab = 2.0 * exact * (P + A * P1) + viscous * (1.0 + 2.0 * s * A)
+    ab_ba = -exact * P
+    for c1 in range(len(axes)):
+        for c2 in range(c1 + 1):
+            unit = 1.0 if c1 == c2 else 0.0
+            aa = a[g, c1] * a[g, c2]
+            ab = a[g, c1] * b[g, c2]
+            ba = b[g, c1] * a[g, c2]
+            bb = b[g, c1] * b[g, c2]
+            entry = p.stiffness
+            entry[c1, c2, g] = aa_1 * unit + aa_aa * aa + aa_ab * (ab + ba) + aa_bb * bb
+            entry[c1, c2, 3 + g] = -both * C * unit + ab_aa * aa + ab_ab * ab + ab_ba * ba
+            entry[c1, c2, 6 + g] = -both * C * unit + ab_aa * aa + ab_ab * ba + ab_ba * ab
+            entry[c1, c2, 9 + g] = both * (A * unit - aa)
 
 
 @inlined
-def _set_turning(axes, elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[no-untyped-def]
+def _add_bending_viscosity(axes, g, weight, p):
+    """Adds the viscous force of bending, `weight` (EI tau times length) J^T J (a_rate, b_rate)."""
+    a = p.a
+    b = p.b
+    u = p.a_rate
+    v = p.b_rate
+    A = 0.0
+    B = 0.0
+    C = 0.0
+    a_u = 0.0
+    b_u = 0.0
+    a_v = 0.0
+    b_v = 0.0
+    for c in range(len(axes)):
+        A += a[g, c] * a[g, c]
+        B += b[g, c] * b[g, c]
+        C += a[g, c] * b[g, c]
+        a_u += a[g, c] * u[g, c]
+        b_u += b[g, c] * u[g, c]
+        a_v += a[g, c] * v[g, c]
+        b_v += b[g, c] * v[g, c]
+    P, s, _ = compute_inverse_square(A)
+    D = max(A * B - C * C, 0.0)
+    weight *= P
+    aa_1 = B + s * D
+    aa_aa = 3.0 * s * B + 4.0 * s * s * D
+    aa_ab = -s * C
+    aa_bb = -1.0 - s * A
+    ab_aa = -2.0 * s * C
+    ab_ab = 1.0 + 2.0 * s * A
+    on_a = aa_aa * a_u + aa_ab * b_u + ab_aa * a_v + ab_ab * b_v
+    on_b = aa_ab * a_u + aa_bb * b_u
+    for c in range(len(axes)):
+        p.force[g, 0, c] += weight * (
+            aa_1 * u[g, c] - C * v[g, c] + on_a * a[g, c] + on_b * b[g, c]
+        )
+        p.force[g, 1, c] += weight * (
+            A * v[g, c] - C * u[g, c] + (ab_aa * a_u - a_v) * a[g, c] + ab_ab * a_u * b[g, c]
+        )
+
+
+@inlined
+def _add_rest_curvature(g, weight, exact, p):
+    """Adds `weight` (minus EI kappa_0 times length) times the signed curvature (planar hose)."""
+    a = (p.a[g, 0], p.a[g, 1])
+    b = (p.b[g, 0], p.b[g, 1])
+    A = a[0] * a[0] + a[1] * a[1]
+    P, s, P2 = compute_inverse_square(A)
+    n = a[0] * b[1] - a[1] * b[0]
+    u = np.sqrt(P)
+    u1 = s * u
+    u2 = (0.5 * P2 - u1 * u1) / u
+    by_a = (b[1], -b[0])
+    by_b = (-a[1], a[0])
+    for c1 in range(2):
+        p.force[g, 0, c1] += weight * (u * by_a[c1] + 2.0 * u1 * n * a[c1])
+        p.force[g, 1, c1] += weight * u * by_b[c1]
+        for c2 in range(c1 + 1):
+            unit = 1.0 if c1 == c2 else 0.0
+            turn = float(c2 - c1)
+            pair = by_a[c1] * a[c2] + a[c1] * by_a[c2]
+            curl = 4.0 * u2 * a[c1] * a[c2] + 2.0 * u1 * unit
+            p.stiffness[c1, c2, g] += weight * exact * (2.0 * u1 * pair + n * curl)
+            p.stiffness[c1, c2, 3 + g] += weight * exact * (u * turn + 2.0 * u1 * a[c1] * by_b[c2])
+            p.stiffness[c1, c2, 6 + g] += weight * exact * (-u * turn + 2.0 * u1 * by_b[c1] * a[c2])
+
+
+@inlined
+def _set_isotropic(axes, elasticity, frames, e, g, weight, exact, step, p):
+    """Sets force and stiffness of Gauss point g of a hose that bends alike in every direction."""
+    tau = elasticity.damping_time
+    bending = weight * elasticity.bending_stiffness[e, g]
+    _set_bending(axes[:3], g, bending, exact, (1.0 - exact) + tau / step, p)
+    if tau != 0.0:
+        _add_bending_viscosity(axes[:3], g, bending * tau, p)
+    if len(axes) == 2 and elasticity.rest_curvature[e, g] != 0.0:
+        _add_rest_curvature(g, -bending * elasticity.rest_curvature[e, g], exact, p)
+
+
+@inlined
+def _set_turning(axes, elasticity, frames, e, g, weight, exact, step, p):
     """Sets force and stiffness of Gauss point g of a hose with theta."""
     if elasticity.frenet:
         _set_isotropic(axes, elasticity, frames, e, g, weight, exact, step, p)
@@ -213,7 +330,7 @@ def _set_turning(axes, elasticity, frames, e, g, weight, exact, step, p):  # typ
 
 
 @inlined
-def _add_turning(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):  # type: ignore[no-untyped-def]
+def _add_turning(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):
     """Adds what span e does to theta to the gradient and the band."""
     if hose.elasticity.frenet:
         add_frenet(hose.tables, hose.elasticity, e, rate, step, exact, p, gradient, band)
@@ -223,26 +340,26 @@ def _add_turning(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):
 
 
 @inlined
-def _add_scalar(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):  # type: ignore[no-untyped-def]
+def _add_scalar(axes, hose, twist, e, rate, step, exact, x, p, gradient, band):
     """Adds the scalar twist of span e."""
     add_twist(axes, hose.tables, twist, e, exact, x, p)
 
 
 @inlined
-def _close_scalar(axes, hose, twist, progress, rate, step, x, gradient):  # type: ignore[no-untyped-def]
+def _close_scalar(axes, hose, twist, progress, rate, step, x, gradient):
     """Adds the force of the scalar twist, now that its angle is known."""
     tau = hose.elasticity.damping_time
-    close_stretches(twist, np.isinf(step), progress, tau, rate, gradient)
+    close_segments(twist, np.isinf(step), progress, tau, rate, gradient)
 
 
 @inlined
-def _close_turning(axes, hose, twist, progress, rate, step, x, gradient):  # type: ignore[no-untyped-def]
+def _close_turning(axes, hose, twist, progress, rate, step, x, gradient):
     """Takes the frames at the clamps along."""
     if not hose.elasticity.frenet:
         move_clamp_frames(axes, twist, x)
 
 
-_open_twist = choose_by_unknowns({3: open_stretches})
+_open_twist = choose_by_unknowns({3: open_segments})
 _set_section = choose_by_unknowns({2: _set_isotropic, 3: _set_isotropic, 4: _set_turning})
 _add_moment = choose_by_unknowns({3: _add_scalar})
 _scatter_theta = choose_by_unknowns({4: _add_turning})
@@ -250,7 +367,7 @@ _close_twist = choose_by_unknowns({3: _close_scalar, 4: _close_turning})
 
 
 @kernel
-def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, band):  # type: ignore[no-untyped-def]
+def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, band):
     """Adds strain energy and Kelvin-Voigt terms: dU + C rate to `gradient`, K + C / step to `band`.
 
     Many arguments, because one kernel serves every scheme and the statics.
@@ -258,7 +375,7 @@ def assemble(axes, hose, twist, progress, x, rate, step, exact, p, gradient, ban
     Args:
         axes: (0.0,) * d, see compiled.py.
         hose: tables and material constants (solver.Hose).
-        twist: clamps, stretches between them and frames; written.
+        twist: clamps, segments between them and frames; written.
         progress: of the clamps' spin, 0 to 1.
         x: unknowns, flat, (n d,).
         rate: their velocity, flat; read only where there is damping.

@@ -1,42 +1,53 @@
 """`GedsHose`: the spline hose behind the HoseModel protocol; a thin class over the kernels.
 
-spline.py knows where the hose is in the world, body.py its state, holds.py and loads.py what acts
-on it, mechanics.py how the kernels are called.
+spline.py knows where the hose is in the world, body.py its state, constraints.py and loads.py what
+acts on it, mechanics.py how the kernels are called.
 """
 
 from __future__ import annotations
 
+import operator
+import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.geds import integrators as schemes
-from hose_mj.hoses.geds import mechanics, statics
-from hose_mj.hoses.geds import newton as solver
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import integrators, mechanics, records
 from hose_mj.hoses.geds.body import SplineBody
-from hose_mj.hoses.geds.body_coupling import Carried
+from hose_mj.hoses.geds.body_coupling import BodyCoupling
 from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
+from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.geds.touching import Touching
 from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Curve, Hold, Linearization, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
-from hose_mj.jit import run_kernel
 
 _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
 
 
-class GedsHose(Carried, Touching, SplineBody):
+_MOVED = {
+    "obstacles": "contacts.obstacles",
+    "contact_arc_lengths": "contacts.arc_lengths",
+    "add_floor": "contacts.add_floor",
+    "move_obstacle": "contacts.move_obstacle",
+    "set_distances": "contacts.set_distances",
+    "contact_forces": "contacts.compute_forces",
+    "contact_reactions": "contacts.list_reactions",
+}
+"""Names of the hose that the documents once had, and where they are now; for one release."""
+
+
+class GedsHose(SplineBody):
     """Geometrically Exact Dynamic Splines (thesis appendix A) with an implicit integrator.
 
-    Queries (position, tension, energies, ...) are those of `SplineBody`, obstacles and contact
-    forces those of `Touching`, steps with bodies that feel the hose those of `Carried`.
+    Queries (position, tension, energies, ...) are those of `SplineBody`.
 
     Args:
         spec: the hose.
@@ -49,7 +60,7 @@ class GedsHose(Carried, Touching, SplineBody):
             point; None for what the spec needs: theta in space where the hose is curved at rest or
             bends unequally. "frenet" is the literal strain of GEDS, to reproduce how it fails
             (docs/frenet.md): theta is then the angle from the Frenet normal, a clamp holds that
-            angle, and a hose is laid with theta = 0, that is twisted by the torsion of its curve.
+            angle, and `reset` sets theta = 0, so that the hose is twisted by its curve's torsion.
         scheme: "bdf2" (default), "backward-euler", "sdirk2", "midpoint" or "verlet".
         tolerance: Newton goes on while it moves a control point by more than this fraction of L;
             with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
@@ -59,8 +70,8 @@ class GedsHose(Carried, Touching, SplineBody):
 
     Attributes:
         spec, gravity, scheme: as given.
-        fallbacks: how often a solve needed the Gauss-Newton matrix or the careful iteration.
-        iterations: Newton iterations so far.
+        contacts: obstacles and contact forces.
+        coupling: steps with bodies that feel the hose.
 
     Raises:
         InputError: a value outside its valid set, named.
@@ -89,14 +100,17 @@ class GedsHose(Carried, Touching, SplineBody):
         spline = Spline(control_points, spec.length, plane, has_theta)
         super().__init__(spec, spline, gravity, twist == "frenet")
         self.scheme = scheme
-        self.fallbacks = self.iterations = self._steps = 0
-        self._timestep = float(timestep)
         move = tolerance * spec.length
-        self._limits = solver.Limits(
-            move, move / _TURN_TOLERANCE, max_iterations, np.inf, False, 0.0
+        turn_length = move / _TURN_TOLERANCE
+        limits = records.Limits(move, turn_length, max_iterations, np.inf, False, 0.0)
+        self.contacts = ContactSet(spline, spec, self.gravity, float(timestep), self._state, scheme)
+        self._loads = LoadSet(spline, self._weight, self.contacts)
+        self._counts = np.zeros(3, dtype=np.int64)
+        self._dynamics = Dynamics(
+            *(self._axes, self._hose, self._constraints, self._loads, limits),
+            *(scheme, float(timestep), self._state, self._counts),
         )
-        self._contacts = ContactSet(self._spline, spec, self.gravity, self._timestep)
-        self._loads = LoadSet(self._spline, self._weight, self._contacts.contact)
+        self.coupling = BodyCoupling(self._dynamics)
         if len(obstacles) > 0:
             self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
@@ -106,24 +120,29 @@ class GedsHose(Carried, Touching, SplineBody):
     @property
     def timestep(self) -> float:
         """Length of one step (s)."""
-        return self._timestep
+        return self._dynamics.timestep
 
     @property
     def time(self) -> float:
         """Simulated time since the last reset (s)."""
-        return self._steps * self._timestep
+        return self._dynamics.time
 
     @property
-    def control_points(self) -> Array:
-        """Control points of the spline now, (n, 3), m."""
-        return self._spline.to_world(self._state.x) + self._spline.offset
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+        return int(self._counts[ITERATIONS])
+
+    @property
+    def fallbacks(self) -> int:
+        """How often a solve needed the Gauss-Newton matrix or the careful iteration so far."""
+        return int(self._counts[FALLBACKS])
 
     def reset(
         self, curve: Curve, velocity: Curve | None = None, director: ArrayLike | None = None
     ) -> None:
-        """Lays the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
+        """Puts the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
 
-        The material is laid free of torque, but for twist="frenet" (docs/frenet.md). A closed loop
+        The material is free of torque, but for twist="frenet" (docs/frenet.md). A closed loop
         is open again.
 
         Args:
@@ -138,7 +157,7 @@ class GedsHose(Carried, Touching, SplineBody):
                 plane of a planar hose; a curve far from the hose's length. Nothing changed then.
         """
         start = None if director is None else check_vector("director", director)
-        self._lay(curve, velocity)
+        self._set_shape(curve, velocity)
         self._start(start)
 
     def set_control_points(self, points: ArrayLike) -> None:
@@ -150,7 +169,7 @@ class GedsHose(Carried, Touching, SplineBody):
         Raises:
             InputError: a wrong shape, a number that is not finite, points out of the plane.
         """
-        self._put(points)
+        self._set_points(points)
         self._start()
 
     def snapshot(self) -> dict[str, Any]:
@@ -158,10 +177,10 @@ class GedsHose(Carried, Touching, SplineBody):
         return {
             "state": {name: part.copy() for name, part in self._state._asdict().items()},
             "offset": self._spline.offset.copy(),
-            "steps": self._steps,
-            "holds": self._holds.snapshot(),
+            "steps": int(self._counts[STEPS]),
+            "holds": self._constraints.snapshot(),
             "loads": self._loads.snapshot(),
-            "contacts": self._contacts.snapshot(),
+            "contacts": self.contacts.snapshot(),
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
         }
@@ -176,16 +195,13 @@ class GedsHose(Carried, Touching, SplineBody):
         if size != self._spline.size:
             valid = f"{self._spline.size}, as in this hose"
             raise InputError("number of unknowns in the snapshot", size, valid)
-        self._state = schemes.State(**{name: part.copy() for name, part in state["state"].items()})
+        self._set_state(integrators.State(**state["state"]))
         self._spline.offset = state["offset"].copy()
-        self._steps = state["steps"]
-        self.iterations, self.fallbacks = state["iterations"], state["fallbacks"]
+        self._counts[:] = state["steps"], state["iterations"], state["fallbacks"]
         self._loads.restore(state["loads"])
-        self._holds.restore(state["holds"], self._state.x)
-        self._contacts.restore(state["contacts"])
-        self._contacts.set_closed(self.is_closed)
-        self._loads.set_contact(self._contacts.contact)
-        self._renew_work()
+        self._constraints.restore(state["holds"])
+        self.contacts.restore(state["contacts"])
+        self.contacts.set_closed(self.is_closed)
 
     # -- holds and loads ---------------------------------------------------------------------------
 
@@ -205,18 +221,15 @@ class GedsHose(Carried, Touching, SplineBody):
         """
         place = self._spline.check_place(arc_length)
         aim = self._spline.check_direction(self.tangent(place)[0] if tangent is None else tangent)
-        across = None if director is None else self._holds.check_director(director, aim)
-        hold = self._holds.add(arc_length, position, aim, self._state.x)
+        across = None if director is None else self._constraints.check_director(director, aim)
+        hold = self._constraints.add(arc_length, position, aim)
         if across is not None:
-            self._holds.turn_to(hold, across, self._state.x)
-        self._renew_work()
+            self._constraints.turn_to(hold, across)
         return hold
 
     def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
         """Holds a point and leaves the tangent free; by default where it is now. See `clamp`."""
-        hold = self._holds.add(arc_length, position, None, self._state.x)
-        self._renew_work()
-        return hold
+        return self._constraints.add(arc_length, position, None)
 
     def move(
         self,
@@ -232,24 +245,23 @@ class GedsHose(Carried, Touching, SplineBody):
         `InputError` for a hold that was released, a tangent or a spin for an attachment, vectors
         out of a planar hose's plane.
         """
-        self._holds.move(hold, position, tangent, spin, self._state.x)
+        self._constraints.move(hold, position, tangent, spin)
 
     @property
     def holds(self) -> list[Hold]:
         """All clamps and attachments, the oldest first."""
-        return self._holds.list_all()
+        return self._constraints.list_all()
 
     def release(self, hold: Hold) -> None:
         """Lets go; raises `InputError` for a hold that was released before."""
-        self._holds.release(hold, self._state.x)
-        self._renew_work()
+        self._constraints.release(hold)
 
     def reaction(self, hold: Hold) -> Reaction:
         """Force (N) and moment (N m) of a hold on the hose at the end of the last step.
 
         Both in the world frame. Raises `InputError` for a hold that was released.
         """
-        return self._holds.reaction(hold, self._state.x)
+        return self._constraints.reaction(hold)
 
     def close(self, spin: float = 0.0) -> None:
         """Joins the end of the hose to its beginning: an O-ring, a belt, a rubber band.
@@ -265,22 +277,18 @@ class GedsHose(Carried, Touching, SplineBody):
         """
         if self._spline.has_theta:
             raise InputError("twist", "theta", "scalar for a hose that is to be closed")
-        self._holds.close(spin, self._state.x)
-        self._contacts.set_closed(True)
-        self._loads.set_contact(self._contacts.contact)
-        self._renew_work()
+        self._constraints.close(spin)
+        self.contacts.set_closed(True)
 
     def open(self) -> None:
         """Parts the ends that `close` has joined; raises `InputError` for an open hose."""
-        self._holds.open(self._state.x)
-        self._contacts.set_closed(False)
-        self._loads.set_contact(self._contacts.contact)
-        self._renew_work()
+        self._constraints.open()
+        self.contacts.set_closed(False)
 
     @property
     def is_closed(self) -> bool:
         """Whether the ends are joined."""
-        return self._holds.is_closed
+        return self._constraints.is_closed
 
     def apply_force(self, arc_length: float, force: ArrayLike) -> None:
         """Adds a point force (3,) N that acts until `clear_loads` (thesis A.27)."""
@@ -289,6 +297,17 @@ class GedsHose(Carried, Touching, SplineBody):
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
         """Adds a point moment (3,) N m until `clear_loads`; what lies along the tangent is lost."""
         self._loads.add_moment(arc_length, moment)
+
+    def set_push(self, arc_lengths: ArrayLike, forces: ArrayLike) -> None:
+        """Replaces the forces (k, 3), N, by which a neighbour pushes at arc lengths (k,), m.
+
+        They act beside those of `apply_force` until the next call or a reset.
+        """
+        self._loads.set_push(arc_lengths, forces)
+
+    def set_obstacles(self, obstacles: Sequence[Obstacle], law: ContactLaw | None = None) -> None:
+        """Replaces what the hose may touch; see `ContactSet.set_obstacles`."""
+        self.contacts.set_obstacles(obstacles, law)
 
     def clear_loads(self) -> None:
         """Drops all point forces and moments; gravity stays."""
@@ -303,18 +322,8 @@ class GedsHose(Carried, Touching, SplineBody):
             InputError: n_steps is not a whole number at or above 0.
             StepError: a step that no fallback finished; the last step that worked is kept.
         """
-        if check_count("n_steps", n_steps, 0) == 0:
-            return
-        counts = np.zeros(3, dtype=np.int64)
-        verdict = run_kernel(
-            *(schemes.advance, self._axes, self._hose, self._holds.rows, self._loads.loads),
-            *(self._limits, schemes.SCHEMES[self.scheme], self._timestep, int(n_steps)),
-            *(self._state, counts),
-        )
-        self._steps += int(counts[schemes.STEPS])
-        self.iterations += int(counts[schemes.ITERATIONS])
-        self.fallbacks += int(counts[schemes.FALLBACKS])
-        self._check(verdict)
+        if check_count("n_steps", n_steps, 0) > 0:
+            self._dynamics.advance(int(n_steps))
 
     def solve_static(self, load_steps: int = 1) -> None:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.
@@ -326,27 +335,15 @@ class GedsHose(Carried, Touching, SplineBody):
                 holds.
             StepError: no equilibrium was found; the state before is kept.
         """
-        check_count("load_steps", load_steps, 1, statics.MOST_LOAD_STEPS)
-        if self.is_closed and self._holds.is_free:
+        check_count("load_steps", load_steps, 1, MOST_LOAD_STEPS)
+        if self.is_closed and self._constraints.is_free:
             valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
             raise InputError("holds of a closed loop", "none", valid)
-        found = statics.find_equilibrium(
-            *(self._axes, self._hose, self._holds.rows, self._loads.loads),
-            *(self._state.x, self._work, int(load_steps)),
-        )
-        self.iterations += found.iterations
-        self.fallbacks += found.fallbacks
-        if found.verdict != solver.DONE:
-            raise StepError(f"no static equilibrium was found: {solver.VERDICTS[found.verdict]}")
-        self._state = schemes.make_state(self._spline.size)
-        self._state.x[:] = found.x
-        statics.accept(self._axes, self._hose, self._holds.rows, self._state, self._work)
+        self._dynamics.solve_static(int(load_steps))
 
     def linearize(self) -> Linearization:
-        """Mass, tangent stiffness and hold rows in the control points' n d coordinates."""
-        self._build_tangent()
-        rows, size = self._holds.rows, self._spline.size
-        return mechanics.compute_linearization(self._axes, self._hose, rows, self._work, size)
+        """Mass, tangent stiffness and constraint rows in the control points' n d coordinates."""
+        return self._dynamics.linearize()
 
     def compute_required_forces(self, acceleration: ArrayLike) -> Array:
         """Forces on the control points for wanted accelerations of theirs (inverse dynamics).
@@ -366,28 +363,28 @@ class GedsHose(Carried, Touching, SplineBody):
         n = self._spline.n_control_points
         if wanted.shape != (n, 3) or not np.all(np.isfinite(wanted)):
             raise InputError("acceleration", wanted.shape, f"finite numbers, shape ({n}, 3)")
-        self._build_tangent()
+        work = self._dynamics.build_tangent()
         drag = self._hose.drag_rate * self._state.v
         inertia = self._multiply_mass(self._spline.from_world(wanted) + drag)
-        internal = self._work.gradient[: self._spline.size]
+        internal = work.gradient[: self._spline.size]
         return self._spline.to_world(inertia + internal - self._loads.loads.force)
 
     # -- inside ------------------------------------------------------------------------------------
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Finds a name that has moved to a part of the hose, with a warning that says where."""
+            if name not in _MOVED:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            moved = _MOVED[name]
+            warnings.warn(
+                f"GedsHose.{name} is now GedsHose.{moved}", DeprecationWarning, stacklevel=2
+            )
+            return operator.attrgetter(moved)(self)
+
     def _start(self, director: Array | None = None) -> None:
-        self._steps = 0
-        self._contacts.set_closed(False)
-        self._loads.set_contact(self._contacts.contact)
+        self._counts[STEPS] = 0
+        self.contacts.set_closed(False)
         self._loads.clear()
-        self._holds.clear(self._state.x, director)
-        self._renew_work()
-
-    def _renew_work(self) -> None:
-        n_points, stride = self._spline.n_control_points, self._spline.stride
-        self._work = solver.make_work(n_points, stride, self._holds.n_rows)
-
-    def _build_tangent(self) -> None:
-        mechanics.build_tangent(
-            *(self._axes, self._hose, self._holds.rows, self._loads.loads),
-            *(self._state.x, self._state.v, self._work),
-        )
+        self._constraints.clear(director)

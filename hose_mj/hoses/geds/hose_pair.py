@@ -59,14 +59,14 @@ class HosePair:
         for _ in range(n_steps):
             points = self.second.position(self._places)
             speeds = self.second.velocity(self._places)
-            self.first.set_neighbour(
+            self.first.contacts.set_neighbour(
                 points, speeds, self.second.spec.outer_radius, self.friction, self._stiffness
             )
             self.first.step()
-            self.second.set_push(self._places, self.first.neighbour_forces())
+            self.second.set_push(self._places, self.first.contacts.compute_neighbour_forces())
             self.second.step()
 
     @property
     def force(self) -> Array:
         """Force of the first hose on the second at the end of the last step (3,), N."""
-        return np.asarray(self.first.neighbour_forces().sum(axis=0))
+        return np.asarray(self.first.contacts.compute_neighbour_forces().sum(axis=0))

@@ -13,17 +13,14 @@ import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
-from hose_mj.hoses.geds.newton import (
-    DEPENDENT_HOLDS,
+from hose_mj.hoses.geds.kkt import multiply_row, solve_with_constraints
+from hose_mj.hoses.geds.newton import add_mass, build, newton
+from hose_mj.hoses.geds.records import (
+    DEPENDENT_CONSTRAINTS,
     DONE,
     NOT_FINITE,
     Limits,
-    add_mass,
-    build,
     make_work,
-    multiply_row,
-    newton,
-    solve_with_holds,
 )
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.twist import accept_twist, start_twist
@@ -70,7 +67,7 @@ ATTEMPTS = 6
 
 
 @inlined
-def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-def]
+def _set_up_stage(scheme, stage, dt, state, work):
     """Writes X, V and the guess x of a stage; returns its length h and where in the step it ends.
 
     work.x_now and work.v_now hold the state at the beginning of the step (or part of a step).
@@ -105,13 +102,13 @@ def _set_up_stage(scheme, stage, dt, state, work):  # type: ignore[no-untyped-de
 
 
 @inlined
-def _set_up_response(holds, scheme, stage, part, parts):  # type: ignore[no-untyped-def]
+def _set_up_response(constraints, scheme, stage, part, parts):
     """Writes what a stage knows of the mean force over the step: base + share lambda.
 
     BDF2's share carries on a third of the force before, so that its impulses are those that change
     the hose's momentum. Where a step is taken in parts, each takes its force for that of the rest.
     """
-    response = holds.response
+    response = constraints.response
     share = 1.0
     if scheme == _BDF2:
         share = 2.0 / 3.0
@@ -131,7 +128,7 @@ def _set_up_response(holds, scheme, stage, part, parts):  # type: ignore[no-unty
 
 
 @merged
-def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, counts):  # type: ignore[no-untyped-def]
+def _try_step(axes, hose, constraints, loads, limits, scheme, dt, parts, state, work, counts):
     """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
 
     Returns the verdict and the length of the last stage.
@@ -142,16 +139,25 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
         work.v_now[k] = state.v[k]
     n_stages = 2 if scheme == _SDIRK2 else 1
     h = dt
-    response = holds.response
+    response = constraints.response
     for row in range(len(response.compliance)):
         response.gathered[row] = 0.0
     for part in range(parts):
         for stage in range(n_stages):
             h, end = _set_up_stage(scheme, stage, dt / parts, state, work)
             fraction = (part + end) / parts
-            _set_up_response(holds, scheme, stage, part, parts)
+            _set_up_response(constraints, scheme, stage, part, parts)
             verdict, iterations, fallbacks = newton(
-                axes, hose, (h, work.X, work.V), holds, fraction, loads, 1.0, limits, work.x, work
+                axes,
+                hose,
+                (h, work.X, work.V),
+                constraints,
+                fraction,
+                loads,
+                1.0,
+                limits,
+                work.x,
+                work,
             )
             counts[ITERATIONS] += iterations
             counts[FALLBACKS] += fallbacks
@@ -171,36 +177,37 @@ def _try_step(axes, hose, holds, loads, limits, scheme, dt, parts, state, work, 
 
 
 @inlined
-def _accept_scalar(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
-    accept_twist(axes, holds.twist, state.x)
+def _accept_scalar(axes, hose, constraints, state, p):
+    accept_twist(axes, constraints.twist, state.x)
 
 
 @inlined
-def _restore_scalar(axes, twist):  # type: ignore[no-untyped-def]
+def _restore_scalar(axes, twist):
     start_twist(twist)
 
 
 @inlined
-def _restore_frames(axes, twist):  # type: ignore[no-untyped-def]
+def _restore_frames(axes, twist):
     restore_frames(twist)
 
 
-_accept = choose_by_unknowns({3: _accept_scalar, 4: accept_frames})
+_accept_twist = choose_by_unknowns({3: _accept_scalar, 4: accept_frames})
 _restore = choose_by_unknowns({3: _restore_scalar, 4: _restore_frames})
 
 
 @inlined
-def start_step(axes, holds, dt):  # type: ignore[no-untyped-def]
+def start_step(axes, constraints, dt):
     """Returns twist and frames to the last accepted state; sets the clamps' rates of spin."""
-    twist = holds.twist
+    twist = constraints.twist
     for clamp in range(len(twist.starts)):
         twist.spin[clamp, 1] = twist.spin[clamp, 0] / dt
     _restore(axes, twist)
 
 
 @merged
-def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
+def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
     """One step; where its Newton fails, backward Euler, in the end in ever finer parts."""
+    # A line search takes more, shorter steps: three times as many may be needed.
     careful = Limits(
         limits.tolerance, limits.turn_length, 3 * limits.max_iterations, np.inf, True, 0.0
     )
@@ -211,12 +218,13 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
             use = _BACKWARD_EULER
         else:
             use = scheme if first else _BACKWARD_EULER
+        # Whole in attempts 0 to 2, then in 8, 64 and 512 parts; see ATTEMPTS.
         parts = 1 if attempt < 3 else 8 ** (attempt - 2)
-        start_step(axes, holds, dt)
+        start_step(axes, constraints, dt)
         verdict, h = _try_step(
             axes,
             hose,
-            holds,
+            constraints,
             loads,
             limits if attempt < 2 else careful,
             use,
@@ -226,7 +234,7 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
             work,
             counts,
         )
-        if verdict == DEPENDENT_HOLDS:
+        if verdict == DEPENDENT_CONSTRAINTS:
             return verdict
         if verdict == DONE:
             for k in range(len(state.x)):
@@ -242,33 +250,33 @@ def _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, co
 
 
 @merged
-def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-untyped-def]
-    """Velocity Verlet with holds on positions and velocities (RATTLE); no damping, no drag."""
+def _step_verlet(axes, hose, constraints, loads, dt, state, work):
+    """Velocity Verlet with constrained positions and velocities (RATTLE); no damping, no drag."""
     width = 4 * len(axes)
     size = len(state.x)
-    start_step(axes, holds, dt)
+    start_step(axes, constraints, dt)
     for k in range(size):
         work.X[k] = state.x[k]
         work.V[k] = state.v[k]
     for half in range(2):
-        # First half: lambda such that x_(n+1) meets the holds. Second: such that v_(n+1) does.
-        for row in range(len(holds.start)):
-            speed = multiply_row(axes, holds, row, work.V, size)
+        # First half: lambda such that x_(n+1) meets G x = g. Second: such that v_(n+1) does.
+        for row in range(len(constraints.start)):
+            speed = multiply_row(axes, constraints, row, work.V, size)
             if half == 0:
-                gap = holds.after[row] - multiply_row(axes, holds, row, work.X, size)
+                gap = constraints.after[row] - multiply_row(axes, constraints, row, work.X, size)
                 work.shift[row] = 2.0 * (gap - dt * speed) / (dt * dt)
             else:
-                wanted = (holds.after[row] - holds.before[row]) / dt
+                wanted = (constraints.after[row] - constraints.before[row]) / dt
                 work.shift[row] = 2.0 * (wanted - speed) / dt
         # A stage of infinite length has no inertia: what it builds is the force.
         infinite = (np.inf, work.X, work.V)
-        build(axes, hose, infinite, holds.twist, 1.0, loads, 1.0, True, work.X, work)
+        build(axes, hose, infinite, constraints.twist, 1.0, loads, 1.0, True, work.X, work)
         for k in range(size):
             for m in range(width):
                 work.band[k, m] = 0.0
         add_mass(axes, hose, 1.0, work.band)
         factorize(axes, size, work.band)
-        verdict = solve_with_holds(axes, holds, 0.0, _NO_CHANGE, 0, size, work)
+        verdict = solve_with_constraints(axes, constraints, 0.0, _NO_CHANGE, 0, size, work)
         if verdict != DONE:
             return verdict
         for k in range(size):
@@ -288,21 +296,23 @@ def _step_verlet(axes, hose, holds, loads, dt, state, work):  # type: ignore[no-
 
 
 @kernel
-def take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts):  # type: ignore[no-untyped-def]
+def take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
     """Takes one step, but for what `end_step` does; returns a verdict.
 
     It allocates nothing, so numba counts no references to the arrays in its records: to count them
     would cost a short hose nearly as much as the step itself.
     """
     if scheme == _VERLET:
-        verdict = _step_verlet(axes, hose, holds, loads, dt, state, work)
+        verdict = _step_verlet(axes, hose, constraints, loads, dt, state, work)
     else:
-        verdict = _step_implicit(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+        verdict = _step_implicit(
+            axes, hose, constraints, loads, limits, scheme, dt, state, work, counts
+        )
     if verdict == DONE:
         counts[STEPS] += 1
-        for row in range(len(holds.start)):
-            holds.multipliers[row] = work.multipliers[row]
-        response = holds.response
+        for row in range(len(constraints.start)):
+            constraints.multipliers[row] = work.multipliers[row]
+        response = constraints.response
         for row in range(len(response.compliance)):
             force = response.base[row] + response.share[0] * work.multipliers[row]
             response.force[row] = force
@@ -310,36 +320,36 @@ def take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
 
 
 @merged
-def end_step(axes, hose, holds, state, p):  # type: ignore[no-untyped-def]
-    """Accepts a step: the holds are where they have come to, twist and frames what was found."""
-    response = holds.response
-    for row in range(len(holds.start)):
-        holds.before[row] = holds.after[row]
+def end_step(axes, hose, constraints, state, p):
+    """Accepts a step: constraints stand where they came to, twist and frames are what was found."""
+    response = constraints.response
+    for row in range(len(constraints.start)):
+        constraints.before[row] = constraints.after[row]
         for other in range(len(response.compliance)):
-            holds.before[row] -= response.compliance[row, other] * response.force[other]
-    _accept(axes, hose, holds, state, p)
+            constraints.before[row] -= response.compliance[row, other] * response.force[other]
+    _accept_twist(axes, hose, constraints, state, p)
 
 
 @compiled
-def advance(axes, hose, holds, loads, limits, scheme, dt, n_steps, state, counts):  # type: ignore[no-untyped-def]
+def advance(axes, hose, constraints, loads, limits, scheme, dt, n_steps, state, counts):
     """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
 
     A step that fails leaves the state at the step before it; `counts` says how many were done. Ten
     arguments: it is the one entry to the dynamics. It makes its work arrays itself, which is
     quicker than handing them over from Python.
     """
-    n_rows = len(holds.start) + len(holds.twist.angle)
+    n_rows = len(constraints.start) + len(constraints.twist.angle)
     work = make_work(hose.mass.shape[0], len(axes), n_rows)
     for _ in range(n_steps):
-        verdict = take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+        verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        end_step(axes, hose, holds, state, work.span)
+        end_step(axes, hose, constraints, state, work.span)
     return DONE
 
 
 @kernel
-def copy_state(source, target):  # type: ignore[no-untyped-def]
+def copy_state(source, target):
     """Copies all of a state into another one."""
     for k in range(len(source.x)):
         target.x[k], target.v[k], target.a[k] = source.x[k], source.v[k], source.a[k]
@@ -348,16 +358,16 @@ def copy_state(source, target):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def try_step(axes, hose, holds, loads, limits, scheme, dt, state, trial, counts):  # type: ignore[no-untyped-def]
-    """Takes one step of a state into `trial`; returns a verdict. `keep_step` makes it count."""
-    n_rows = len(holds.start) + len(holds.twist.angle)
+def try_step(axes, hose, constraints, loads, limits, scheme, dt, state, trial, counts):
+    """Takes one step of a state into `trial`; returns a verdict. `accept_step` makes it count."""
+    n_rows = len(constraints.start) + len(constraints.twist.angle)
     work = make_work(hose.mass.shape[0], len(axes), n_rows)
     copy_state(state, trial)
-    return take_step(axes, hose, holds, loads, limits, scheme, dt, trial, work, counts)
+    return take_step(axes, hose, constraints, loads, limits, scheme, dt, trial, work, counts)
 
 
 @compiled
-def keep_step(axes, hose, holds, trial, state):  # type: ignore[no-untyped-def]
+def accept_step(axes, hose, constraints, trial, state):
     """Makes a step of `try_step` count."""
     copy_state(trial, state)
-    end_step(axes, hose, holds, state, make_span())
+    end_step(axes, hose, constraints, state, make_span())

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.hoses.geds import newton as solver
-from hose_mj.hoses.geds.contact_law import Contact
+from hose_mj.errors import InputError
+from hose_mj.hoses.geds import records
+from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import check_vector
+from hose_mj.hoses.inputs import check_arc_lengths, check_vector
 from hose_mj.hoses.protocol import Array
 
 
@@ -20,18 +21,23 @@ class LoadSet:
     Args:
         spline: the hose's geometry.
         weight: generalised force of gravity on the control points, flat (n d,), N.
-        contact: what may be touched; `set_contact` replaces it.
-
-    Attributes:
-        loads: what the kernels read; made anew by every change.
+        contacts: what may be touched.
     """
 
-    def __init__(self, spline: Spline, weight: Array, contact: Contact) -> None:
+    _loads: records.Loads
+
+    def __init__(self, spline: Spline, weight: Array, contacts: ContactSet) -> None:
         self._spline = spline
         self._weight = weight
-        self._contact = contact
-        self.loads: solver.Loads
+        self._contacts = contacts
         self.clear()
+
+    @property
+    def loads(self) -> records.Loads:
+        """What the kernels read; made anew by every change."""
+        if self._loads.contact is not self._contacts.contact:
+            self._loads = self._loads._replace(contact=self._contacts.contact)
+        return self._loads
 
     def clear(self) -> None:
         """Drops all point forces and moments, those of a neighbour too."""
@@ -40,14 +46,17 @@ class LoadSet:
         self._push = np.zeros_like(self._weight)
         self._rebuild()
 
-    def set_contact(self, contact: Contact) -> None:
-        """Replaces what may be touched."""
-        self._contact = contact
-        self.loads = self.loads._replace(contact=contact)
+    def set_push(self, arc_lengths: ArrayLike, forces: ArrayLike) -> None:
+        """Replaces the forces (k, 3) of a neighbour at arc lengths (k,); see `GedsHose.set_push`.
 
-    def set_push(self, places: Array, forces: Array) -> None:
-        """Replaces the forces (k, 3) of a neighbour at arc lengths (k,)."""
-        self._push = self._spline.from_world(self._spline.compute_jacobian(places) @ forces)
+        Raises:
+            InputError: places off the hose, forces that are not finite or of another shape.
+        """
+        places = check_arc_lengths(arc_lengths, self._spline.length)
+        vectors = np.asarray(forces, dtype=np.float64)
+        if vectors.shape != (len(places), 3) or not np.all(np.isfinite(vectors)):
+            raise InputError("forces", vectors.shape, f"finite numbers, shape ({len(places)}, 3)")
+        self._push = self._spline.from_world(self._spline.compute_jacobian(places) @ vectors)
         self._rebuild()
 
     def add_force(self, arc_length: float, force: ArrayLike) -> None:
@@ -91,11 +100,11 @@ class LoadSet:
         self._rebuild()
 
     def _rebuild(self) -> None:
-        d, stride = self._spline.dimension, self._spline.stride
+        d, n_dof = self._spline.dimension, self._spline.n_dof
         force = self._weight + self._push
         for place, vector in self._forces:
             starts, values = self._spline.compute_basis(np.array([place]))
-            window = force[starts[0] : starts[0] + 4 * stride].reshape(4, stride)
+            window = force[starts[0] : starts[0] + 4 * n_dof].reshape(4, n_dof)
             window[:, :d] += np.outer(values[0, 0], vector[self._spline.dims])
         places = np.array([place for place, _ in self._moments])
         starts, values = self._spline.compute_basis(places)
@@ -106,4 +115,4 @@ class LoadSet:
             else:
                 moments[k, 0] = vector @ self._spline.normal
         values = np.ascontiguousarray(values[:, :2])
-        self.loads = solver.Loads(force, starts, values, moments, self._contact)
+        self._loads = records.Loads(force, starts, values, moments, self._contacts.contact)

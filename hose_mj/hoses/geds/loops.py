@@ -2,11 +2,11 @@
 
 The end of a loop is joined to its beginning, r(0) = r(L) and r'(0) = r'(L), by 2 d rows of
 G x = g. They read the first and the last four control points and so do not fit a band; like the
-rows of all holds they are met by Lagrange multipliers (solver.py). Their coefficients add up to
+rows of all constraints they are met by Lagrange multipliers (kkt.py). Their coefficients add up to
 zero, and place and slope are joined alike: the joint changes neither linear nor angular momentum.
 The moment is continuous across it as it is in the continuum, where nothing asks for it.
 
-The twist of a loop is that of one stretch whose last director is glued to its first (twist.py).
+The twist of a loop is that of one segment whose last director is glued to its first (twist.py).
 """
 
 from __future__ import annotations
@@ -74,12 +74,6 @@ def make_joint_rows(spline: Spline) -> Array:
     return rows.reshape(2 * d, 8 * d)
 
 
-def check_open(is_closed: bool) -> None:
-    """Raises `InputError` for a hose that is a loop already."""
-    if is_closed:
-        raise InputError("close()", "a closed loop", "an open hose (open it first)")
-
-
 def check_ends(spline: Spline, held: Sequence[float], x: Array) -> None:
     """Raises `InputError` for ends that cannot be joined.
 
@@ -90,7 +84,7 @@ def check_ends(spline: Spline, held: Sequence[float], x: Array) -> None:
     """
     ends = np.array([0.0, spline.length])
     if all(np.any(np.abs(np.array(held) - end) < 1e-9 * spline.length) for end in ends):
-        raise InputError("close()", "a hose held at both ends", "one held at one end at most")
+        raise InputError.about("cannot close a hose that is held at both ends: release one")
     first, last = spline.evaluate(ends, x)
     gap = float(np.linalg.norm(last - first))
     if gap > LARGEST_GAP * spline.length:

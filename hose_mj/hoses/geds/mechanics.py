@@ -1,24 +1,25 @@
-"""What stands between `GedsHose` and the kernels: constants, equilibrium, tangents, tension."""
+"""What stands between `GedsHose` and the kernels: constants, dense matrices, tension, twist.
+
+A hose may vary along its length. A Gauss point stands for a cell of its span as long as its weight,
+and has the mean of that cell: a short coupling between two Gauss points is not lost, and the mass
+is right to the last gram.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy
-from hose_mj.hoses.geds import integrators as schemes
-from hose_mj.hoses.geds import newton as solver
-from hose_mj.hoses.geds.contact import add_contact
-from hose_mj.hoses.geds.fittings import average_density, average_stiffness, make_cells
+from hose_mj.hoses.geds import basis, integrators, newton, records
+from hose_mj.hoses.geds.frenet import SMALLEST_BEND
 from hose_mj.hoses.geds.span import Elasticity
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
-from hose_mj.hoses.protocol import Array, Linearization
+from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.jit import compile_notice, run_kernel
-from hose_mj.validation.frenet import SMALLEST_BEND
-
-_ENDLESS = float(np.finfo(np.float64).max)
 
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
@@ -41,13 +42,13 @@ def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool) -> None:
     """Raises `InputError` for an unknown scheme, or one that cannot do what the hose needs."""
     if scheme == "verlet" and has_theta:
         raise InputError("scheme", scheme, "an implicit scheme for a hose with theta")
-    if scheme not in schemes.SCHEMES:
-        raise InputError("scheme", scheme, "one of " + ", ".join(schemes.SCHEMES))
+    if scheme not in integrators.SCHEMES:
+        raise InputError("scheme", scheme, "one of " + ", ".join(integrators.SCHEMES))
     if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0):
         raise InputError("scheme", scheme, "an implicit scheme for a hose with damping or drag")
 
 
-def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> solver.Hose:
+def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> records.Hose:
     """Returns what the kernels need to know of a hose with these knots (n + 4,).
 
     `frenet`: whether its theta is measured from the Frenet normal (frenet.py).
@@ -74,44 +75,51 @@ def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> solver
     mass = basis.make_mass(knots, average_density(spec, quarters))
     # Of a solid round section about its axis.
     gyration = 0.5 * spec.outer_radius**2
-    return solver.Hose(tables, elasticity, mass, gyration, float(spec.drag / spec.linear_density))
+    return records.Hose(tables, elasticity, mass, gyration, float(spec.drag / spec.linear_density))
 
 
-def multiply_mass(axes: tuple[float, ...], hose: solver.Hose, flat: Array) -> Array:
+def make_cells(weights: Array, n_spans: int, length: float) -> Array:
+    """Returns where the cells of Gauss points with these weights (k,) begin and end, (S, k, 2)."""
+    edges = np.concatenate([[0.0], np.cumsum(weights)])
+    inside = np.stack([edges[:-1], edges[1:]], axis=1)
+    return np.asarray((np.arange(n_spans)[:, None, None] + inside) * length / n_spans)
+
+
+def average_stiffness(spec: HoseSpec, name: str, cells: Array) -> Array:
+    """Returns the stiffness of cells (..., 2) whose pieces are springs in series.
+
+    It is the inverse of the mean softness; 0 everywhere if the hose itself has none.
+    """
+    if getattr(spec, name) == 0.0:
+        return np.zeros(cells.shape[:-1])
+    return 1.0 / _average(spec, name, cells, lambda value: 1.0 / value)
+
+
+def average_density(spec: HoseSpec, cells: Array) -> Array:
+    """Returns the mean mass per length of cells (..., 2), kg/m."""
+    return _average(spec, "linear_density", cells, lambda value: value)
+
+
+def _average(spec: HoseSpec, name: str, cells: Array, convert: Callable[[float], float]) -> Array:
+    """Mean of what is made of a property over cells (..., 2)."""
+    own = convert(float(getattr(spec, name)))
+    mean = np.full(cells.shape[:-1], own)
+    for fitting in spec.fittings:
+        value = getattr(fitting, name)
+        if value is not None:
+            common = np.minimum(cells[..., 1], fitting.end) - np.maximum(
+                cells[..., 0], fitting.start
+            )
+            share = np.maximum(common, 0.0) / (cells[..., 1] - cells[..., 0])
+            mean += share * (convert(float(value)) - own)
+    return mean
+
+
+def multiply_mass(axes: tuple[float, ...], hose: records.Hose, flat: Array) -> Array:
     """Returns M times a flat vector."""
     out = np.zeros(len(flat))
-    run_kernel(solver.multiply_mass, axes, hose, 1.0, flat, out)
+    run_kernel(newton.multiply_mass, axes, hose, 1.0, flat, out)
     return out
-
-
-def build_tangent(
-    axes: tuple[float, ...],
-    hose: solver.Hose,
-    holds: solver.Holds,
-    loads: solver.Loads,
-    x: Array,
-    v: Array,
-    work: solver.Work,
-) -> None:
-    """Writes dU + C v less moments and contact to work.gradient, its derivative to work.band.
-
-    Forces, gravity, inertia and holds are left out; so are the derivative of damping and friction
-    and the rank-one terms of the twist.
-    """
-    work.gradient[:] = 0.0
-    work.band[:] = 0.0
-    work.rate[: len(x)] = v
-    run_kernel(schemes.start_step, axes, holds, np.inf)
-    run_kernel(
-        *(energy.assemble, axes, hose, holds.twist, 0.0, x, work.rate, np.inf, True),
-        *(work.span, work.gradient, work.band),
-    )
-    run_kernel(solver.add_moments, axes, loads, True, x, work)
-    # Within a step without end nothing changes its velocity, but what slides still rubs.
-    run_kernel(
-        *(add_contact, axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
-        *(work.gradient, work.band),
-    )
 
 
 def make_dense(band: Array, size: int, width: int) -> Array:
@@ -124,32 +132,14 @@ def make_dense(band: Array, size: int, width: int) -> Array:
     return dense
 
 
-def make_dense_rows(holds: solver.Holds, size: int, width: int) -> Array:
-    """Returns the rows of the holds, which read `width` unknowns each, as a matrix (m, size)."""
-    dense = np.zeros((len(holds.start), size))
-    for row, start in enumerate(holds.start):
-        dense[row, start : start + width] = holds.rows[row, :width]
-    if holds.rows.shape[1] > width:
-        dense[:, size - width :] += holds.rows[:, width:]
+def make_dense_rows(constraints: records.Constraints, size: int, width: int) -> Array:
+    """Returns the constraints' rows, which read `width` unknowns each, as a matrix (m, size)."""
+    dense = np.zeros((len(constraints.start), size))
+    for row, start in enumerate(constraints.start):
+        dense[row, start : start + width] = constraints.rows[row, :width]
+    if constraints.rows.shape[1] > width:
+        dense[:, size - width :] += constraints.rows[:, width:]
     return dense
-
-
-def compute_linearization(
-    axes: tuple[float, ...],
-    hose: solver.Hose,
-    holds: solver.Holds,
-    work: solver.Work,
-    size: int,
-) -> Linearization:
-    """Returns dense mass, stiffness (from `build_tangent`) and hold rows; overwrites work.band."""
-    width = 4 * len(axes)
-    stiffness = make_dense(work.band, size, width)
-    for row, compliance in zip(holds.twist.rows, holds.twist.compliance, strict=True):
-        stiffness += np.outer(row[:size], row[:size]) / compliance
-    work.band[:] = 0.0
-    run_kernel(solver.add_mass, axes, hose, 1.0, work.band)
-    mass = make_dense(work.band, size, width)
-    return Linearization(mass, stiffness, make_dense_rows(holds, size, width))
 
 
 def interpolate_tension(forces: Array, length: float, s: Array) -> Array:
@@ -166,7 +156,7 @@ def interpolate_tension(forces: Array, length: float, s: Array) -> Array:
     return np.asarray(np.interp(s, nodes, np.concatenate([[first], mean, [last]])))
 
 
-def find_torsional_stiffness(hose: solver.Hose, s: Array) -> Array:
+def get_torsional_stiffness(hose: records.Hose, s: Array) -> Array:
     """Returns GJ (k,) of the cells that arc lengths s (k,) are in."""
     stiffness = hose.elasticity.torsional_stiffness
     edges = make_cells(
@@ -176,7 +166,7 @@ def find_torsional_stiffness(hose: solver.Hose, s: Array) -> Array:
     return np.asarray(stiffness.ravel()[at])
 
 
-def compute_torsion(spline: Spline, hose: solver.Hose, s: Array, x: Array) -> Array:
+def compute_torsion(spline: Spline, hose: records.Hose, s: Array, x: Array) -> Array:
     """Returns the Frenet torsion (k,), rad/m, at arc lengths s (k,); see frenet.py."""
     length = hose.tables.span_length
     first, second = (spline.evaluate(s, x, derivative) for derivative in (1, 2))
@@ -189,7 +179,7 @@ def compute_torsion(spline: Spline, hose: solver.Hose, s: Array, x: Array) -> Ar
     return np.asarray(volume / np.maximum(squares, (SMALLEST_BEND / length) ** 2))
 
 
-def compute_twist(spline: Spline, hose: solver.Hose, stretches: Twist, s: Array, x: Array) -> Array:
+def compute_twist(spline: Spline, hose: records.Hose, twist: Twist, s: Array, x: Array) -> Array:
     """Returns the twist beyond its rest (k,), rad/m, at arc lengths s (k,)."""
     if hose.elasticity.frenet:
         rest = hose.elasticity.rest_torsion[0, 0]
@@ -199,13 +189,13 @@ def compute_twist(spline: Spline, hose: solver.Hose, stretches: Twist, s: Array,
         length = spline.length / len(hose.tables.first)
         nodes = np.cumsum(np.tile(hose.tables.gaps, len(hose.tables.first))) * length
         nodes -= nodes[0] - 0.5 * hose.tables.gaps[0] * length
-        gathered = np.interp(s, nodes, stretches.frames[: len(nodes), 9])
+        gathered = np.interp(s, nodes, twist.frames[: len(nodes), 9])
         rest = np.interp(s, nodes, hose.elasticity.rest_torsion.ravel())
         return np.asarray(spline.evaluate_theta(s, x, 1) + gathered - rest)
     rate = np.zeros(len(s))
-    places = stretches.places * hose.tables.span_length
-    torques = (stretches.angle / stretches.compliance)[find_owners(stretches)]
-    for (first, last), torque in zip(stretches.ends, torques, strict=True):
+    places = twist.places * hose.tables.span_length
+    torques = (twist.angle / twist.compliance)[find_owners(twist)]
+    for (first, last), torque in zip(twist.ends, torques, strict=True):
         inside = (s >= places[first]) & (s <= places[last])
-        rate[inside] = torque / find_torsional_stiffness(hose, s[inside])
+        rate[inside] = torque / get_torsional_stiffness(hose, s[inside])
     return rate

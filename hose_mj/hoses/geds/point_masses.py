@@ -18,7 +18,7 @@ import numpy as np
 
 from hose_mj.hoses.geds.contact import compute_forces
 from hose_mj.hoses.geds.integrators import end_step, take_step
-from hose_mj.hoses.geds.newton import DONE, VERDICTS, make_work
+from hose_mj.hoses.geds.records import DONE, VERDICTS, make_work
 from hose_mj.hoses.geds.shapes import POSITION, VELOCITY, measure
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compiled, kernel
@@ -60,7 +60,7 @@ class PointMasses(NamedTuple):
 
 
 @kernel
-def _is_clear(masses, dt):  # type: ignore[no-untyped-def]
+def _is_clear(masses, dt):
     """Whether no mass can meet another or a wall within the next step."""
     for i in range(len(masses.reach)):
         speed = 0.0
@@ -84,8 +84,8 @@ def _is_clear(masses, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _aim(axes, holds, masses, first, dt):  # type: ignore[no-untyped-def]
-    """Writes where the masses would be without the hose, and by how much they give way."""
+def _aim(axes, constraints, masses, first, dt):
+    """Writes where the masses would be without the hose, and their compliance."""
     for i in range(len(first)):
         for c in range(len(axes[:3])):
             row = first[i] + c
@@ -93,24 +93,24 @@ def _aim(axes, holds, masses, first, dt):  # type: ignore[no-untyped-def]
             force = masses.force[i, c] + masses.push[i, c]
             force -= masses.drag[i, c] * masses.velocity[i, c]
             speed = masses.velocity[i, c] + dt * force / resistance
-            holds.after[row] = masses.position[i, c] + dt * speed
-            holds.response.compliance[row, row] = dt * dt / resistance
+            constraints.after[row] = masses.position[i, c] + dt * speed
+            constraints.response.compliance[row, row] = dt * dt / resistance
 
 
 @kernel
-def _move(axes, holds, masses, first, dt):  # type: ignore[no-untyped-def]
+def _move(axes, constraints, masses, first, dt):
     """Moves the masses to where the step has found them."""
     for i in range(len(first)):
         for c in range(len(axes[:3])):
             row = first[i] + c
-            gave = holds.response.compliance[row, row] * holds.response.force[row]
-            place = holds.after[row] - gave
+            gave = constraints.response.compliance[row, row] * constraints.response.force[row]
+            place = constraints.after[row] - gave
             masses.velocity[i, c] = (place - masses.position[i, c]) / dt
             masses.position[i, c] = place
 
 
 @kernel
-def _carry_shapes(geoms, masses):  # type: ignore[no-untyped-def]
+def _move_shapes(geoms, masses):
     """Moves the obstacles that belong to masses."""
     for g in range(len(masses.owner)):
         i = masses.owner[g]
@@ -121,14 +121,14 @@ def _carry_shapes(geoms, masses):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_with_masses(axes, hose, holds, loads, limits, run, state, counts, masses, first):  # type: ignore[no-untyped-def]
+def advance_with_masses(axes, hose, constraints, loads, limits, run, state, counts, masses, first):
     """Advances hose and masses by up to n_steps steps; returns a verdict, `NEAR` among them.
 
     As `schemes.advance`, with `run` the scheme, dt and n_steps, and `first` the first rows of the
-    masses' holds, (k,).
+    masses' constraints, (k,).
     """
     scheme, dt, n_steps = run
-    n_rows = len(holds.start) + len(holds.twist.angle)
+    n_rows = len(constraints.start) + len(constraints.twist.angle)
     work = make_work(hose.mass.shape[0], len(axes), n_rows)
     contact = loads.contact
     forces = np.zeros((contact.points.shape[0], 3))
@@ -136,12 +136,12 @@ def advance_with_masses(axes, hose, holds, loads, limits, run, state, counts, ma
     for _ in range(n_steps):
         if not _is_clear(masses, dt):
             return NEAR
-        _aim(axes, holds, masses, first, dt)
-        verdict = take_step(axes, hose, holds, loads, limits, scheme, dt, state, work, counts)
+        _aim(axes, constraints, masses, first, dt)
+        verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        end_step(axes, hose, holds, state, work.span)
-        _move(axes, holds, masses, first, dt)
+        end_step(axes, hose, constraints, state, work.span)
+        _move(axes, constraints, masses, first, dt)
         if len(masses.owner) > 0:
             compute_forces(axes, contact, state.x, state.v, forces, reactions)
             masses.push[:, :] = 0.0
@@ -150,5 +150,5 @@ def advance_with_masses(axes, hose, holds, loads, limits, run, state, counts, ma
                 if i >= 0:
                     for c in range(3):
                         masses.push[i, c] += reactions[g, c]
-            _carry_shapes(contact.geoms, masses)
+            _move_shapes(contact.geoms, masses)
     return DONE

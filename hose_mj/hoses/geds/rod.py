@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.hoses.geds.span import SMALLEST_A
+from hose_mj.hoses.geds.span import LEAST_TURN_ROOM, SMALLEST_A
 from hose_mj.jit import inlined
 
 TANGENT, SLOPE, DIRECTOR, RATE = 0, 3, 6, 9
@@ -34,7 +34,7 @@ TANGENT, SLOPE, DIRECTOR, RATE = 0, 3, 6, 9
 
 
 @inlined
-def compute_cosine_and_sine(angle):  # type: ignore[no-untyped-def]
+def compute_cosine_and_sine(angle):
     """Cosine and sine of an angle (rad) to the rounding of the angle, for less than two calls.
 
     Their power series about the nearest multiple of pi / 2.
@@ -57,7 +57,7 @@ def compute_cosine_and_sine(angle):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+def move_frame(frames, f, a0, a1, a2, b0, b1, b2):
     """Takes frame f along to a new a = r' and b = r''; returns 1 / |a|."""
     inverse = 1.0 / np.sqrt(max(a0 * a0 + a1 * a1 + a2 * a2, SMALLEST_A))
     t0, t1, t2 = a0 * inverse, a1 * inverse, a2 * inverse
@@ -68,7 +68,7 @@ def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-de
         (b2 - along * t2) * inverse,
     )
     u0, u1, u2 = frames[f, 0], frames[f, 1], frames[f, 2]
-    scale = 1.0 / max(1.0 + u0 * t0 + u1 * t1 + u2 * t2, 1e-6)
+    scale = 1.0 / max(1.0 + u0 * t0 + u1 * t1 + u2 * t2, LEAST_TURN_ROOM)
     v0, v1, v2 = frames[f, 3] + s0, frames[f, 4] + s1, frames[f, 5] + s2
     turn = (u1 * t2 - u2 * t1) * v0 + (u2 * t0 - u0 * t2) * v1 + (u0 * t1 - u1 * t0) * v2
     frames[f, 9] -= scale * turn
@@ -83,7 +83,7 @@ def move_frame(frames, f, a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-de
 
 
 @inlined
-def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
+def compute_rod_strains(frames, f, g, p):
     """Moves the frame of Gauss point g and returns K1, K2 and the twist there, and 1 / A.
 
     Writes their derivatives by (a, theta') and (b, theta) to p.strains, m1 and m2 to p.directors.
@@ -128,7 +128,7 @@ def compute_rod_strains(frames, f, g, p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def set_rod(elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[no-untyped-def]
+def set_rod(elasticity, frames, e, g, weight, exact, step, p):
     """Sets force and stiffness of Gauss point g of span e, Kelvin-Voigt terms included.
 
     Args:
@@ -186,7 +186,7 @@ def set_rod(elasticity, frames, e, g, weight, exact, step, p):  # type: ignore[n
 
 
 @inlined
-def _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p):  # type: ignore[no-untyped-def]
+def _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p):
     """Adds what stresses s0, s1, s2 times the strains' second derivatives make (see above).
 
     `inverse` is 1 / A.
@@ -212,7 +212,6 @@ def _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p):  # type: igno
     bending = k0 * w0 + k1 * w1 + k2 * w2
     q0, q1, q2 = k1 * t2 - k2 * t1, k2 * t0 - k0 * t2, k0 * t1 - k1 * t0
     x0, x1, x2 = b1 * w2 - b2 * w1, b2 * w0 - b0 * w2, b0 * w1 - b1 * w0
-    y0, y1, y2 = w1 * a2 - w2 * a1, w2 * a0 - w0 * a2, w0 * a1 - w1 * a0
     unit = -3.0 * bending * inverse
     aa = 9.0 * bending * inverse * inverse
     ax = -2.0 * inverse * inverse
@@ -241,6 +240,23 @@ def _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p):  # type: igno
         + inverse * (z2 * k1 + k2 * z1)
         - half * (q2 * v1 + v2 * q1)
     )
+    _add_mixed_derivatives(frames, f, g, s2, inverse, (w0, w1, w2), (v0, v1, v2), (k0, k1, k2), p)
+    m[3, 3, 3 + g] -= bending
+
+
+@inlined
+def _add_mixed_derivatives(frames, f, g, s2, inverse, w, v, k, p):
+    """Adds the second derivatives by a and b, and by theta with either; w = W, v = V, k = kb."""
+    a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
+    b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
+    t0, t1, t2 = frames[f, 0], frames[f, 1], frames[f, 2]
+    w0, w1, w2 = w
+    v0, v1, v2 = v
+    k0, k1, k2 = k
+    y0, y1, y2 = w1 * a2 - w2 * a1, w2 * a0 - w0 * a2, w0 * a1 - w1 * a0
+    ax = -2.0 * inverse * inverse
+    half = 0.5 * inverse
+    m = p.stiffness
     # [c]x with c = -W / A + s3 t / (2 A), row a, column b.
     c0 = half * s2 * t0 - inverse * w0
     c1 = half * s2 * t1 - inverse * w1
@@ -264,4 +280,3 @@ def _add_second_derivatives(frames, f, g, s0, s1, s2, inverse, p):  # type: igno
     m[3, 0, 6 + g] += (v1 * a2 - v2 * a1) * inverse
     m[3, 1, 6 + g] += (v2 * a0 - v0 * a2) * inverse
     m[3, 2, 6 + g] += (v0 * a1 - v1 * a0) * inverse
-    m[3, 3, 3 + g] -= bending

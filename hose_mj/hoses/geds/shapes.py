@@ -24,7 +24,7 @@ _NO_AXIS = (0.0, 0.0, 0.0)
 
 
 @kernel
-def is_near(geoms, g, point, reach):  # type: ignore[no-untyped-def]
+def is_near(geoms, g, point, reach):
     """Whether a ball of radius `reach` about a point may touch geom g (its bounding sphere)."""
     d0 = point[0] - geoms[g, POSITION]
     d1 = point[1] - geoms[g, POSITION + 1]
@@ -37,7 +37,7 @@ def is_near(geoms, g, point, reach):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measure(geoms, g, point):  # type: ignore[no-untyped-def]
+def measure(geoms, g, point):
     """Distance from geom g and its first two derivatives.
 
     Returns:
@@ -69,7 +69,7 @@ def measure(geoms, g, point):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _turn(geoms, g, v):  # type: ignore[no-untyped-def]
+def _turn(geoms, g, v):
     """A local vector in the world frame."""
     at = ROTATION
     return (
@@ -80,7 +80,7 @@ def _turn(geoms, g, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure_capsule(radius, half, q):  # type: ignore[no-untyped-def]
+def _measure_capsule(radius, half, q):
     """A capsule along z; a sphere is one without length."""
     z = q[2] - min(max(q[2], -half), half)
     far = np.sqrt(q[0] * q[0] + q[1] * q[1] + z * z)
@@ -95,7 +95,7 @@ def _measure_capsule(radius, half, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure_cylinder(size, q):  # type: ignore[no-untyped-def]
+def _measure_cylinder(size, q):
     """A cylinder along z of radius size[0] and half length size[1]."""
     far = np.sqrt(q[0] * q[0] + q[1] * q[1])
     inverse = 1.0 / max(far, 1e-12)
@@ -115,7 +115,7 @@ def _measure_cylinder(size, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure_box(size, q):  # type: ignore[no-untyped-def]
+def _measure_box(size, q):
     """A box of half lengths `size`: nearest face, edge or corner; inside, the nearest face."""
     o0 = abs(q[0]) - size[0]
     o1 = abs(q[1]) - size[1]
@@ -145,7 +145,7 @@ def _measure_box(size, q):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def measure_points(geoms, g, points, distances, normals):  # type: ignore[no-untyped-def]
+def measure_points(geoms, g, points, distances, normals):
     """Writes the distances (k,) of points (k, 3) from geom g and the outward normals (k, 3)."""
     for k in range(points.shape[0]):
         point = (points[k, 0], points[k, 1], points[k, 2])

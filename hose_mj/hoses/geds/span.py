@@ -16,6 +16,13 @@ from hose_mj.jit import compiled, inlined
 
 SMALLEST_A = 0.01
 """A below which |a| and A are continued by polynomials."""
+LEAST_A = 1e-4
+"""Where there is only a division by A, it counts as this at least: |r'| is a hundredth then."""
+LEAST_SQUARE = 1e-12
+"""Of a vector that is made a unit vector: below it there is no direction in it to be found."""
+LEAST_TURN_ROOM = 1e-6
+"""Least 1 + cosine of the smallest rotation between two tangents, which has no axis at half a turn;
+within 0.1 degrees of that it is short of the rotation instead of infinite."""
 
 
 class Elasticity(NamedTuple):
@@ -75,7 +82,7 @@ class Span(NamedTuple):
 
 
 @compiled
-def make_span():  # type: ignore[no-untyped-def]
+def make_span():
     """Returns work arrays for one thread."""
     return Span(
         np.zeros((3, 4)),
@@ -93,7 +100,7 @@ def make_span():  # type: ignore[no-untyped-def]
 
 
 @inlined
-def compute_stretch(A):  # type: ignore[no-untyped-def]
+def compute_stretch(A):
     """|a| and its first two derivatives by A."""
     if A >= SMALLEST_A:
         stretch = np.sqrt(A)
@@ -109,7 +116,7 @@ def compute_stretch(A):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def compute_inverse_square(A):  # type: ignore[no-untyped-def]
+def compute_inverse_square(A):
     """P = 1 / A^2, s = P' / (2 P) and P'' (derivatives by A)."""
     if A >= SMALLEST_A:
         inverse = 1.0 / A
@@ -129,7 +136,7 @@ def compute_inverse_square(A):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def compute_derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped-def]
+def compute_derivatives(axes, tables, e, g, x, a, b):
     """Writes a[g] = r' and b[g] = r'' at Gauss point g of span e; returns A, B, C.
 
     With four unknowns a control point, theta' and theta become the fourth entries of a and b.
@@ -167,7 +174,7 @@ def compute_derivatives(axes, tables, e, g, x, a, b):  # type: ignore[no-untyped
 
 
 @inlined
-def load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
+def load_span(axes, tables, e, x, p):
     """Computes r', r'', |r'| and the derivatives of the two strain modes of span e."""
     for g in range(3):
         A = compute_derivatives(axes, tables, e, g, x, p.a, p.b)[0]
@@ -187,7 +194,7 @@ def load_span(axes, tables, e, x, p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def load_rates(axes, tables, e, rate, p):  # type: ignore[no-untyped-def]
+def load_rates(axes, tables, e, rate, p):
     """Computes the rates of r' and r'' at span e; returns those of the two strain modes."""
     mean = 0.0
     linear = 0.0

@@ -66,19 +66,19 @@ class Spline:
         return len(self.dims)
 
     @property
-    def stride(self) -> int:
+    def n_dof(self) -> int:
         """Unknowns per control point: d, or 4 with theta."""
         return len(self.axes)
 
     @property
     def has_theta(self) -> bool:
         """True where the fourth unknown of a control point is the angle of the material."""
-        return self.stride == 4
+        return self.n_dof == 4
 
     @property
     def size(self) -> int:
         """Unknowns of the hose."""
-        return self.n_control_points * self.stride
+        return self.n_control_points * self.n_dof
 
     @cached_property
     def normal(self) -> Array:
@@ -90,13 +90,13 @@ class Spline:
 
     def to_world(self, flat: Array) -> Array:
         """Returns the places in flat unknowns as vectors of the world (n, 3), without offset."""
-        world = np.zeros((len(flat) // self.stride, 3))
-        world[:, self.dims] = flat.reshape(-1, self.stride)[:, : self.dimension]
+        world = np.zeros((len(flat) // self.n_dof, 3))
+        world[:, self.dims] = flat.reshape(-1, self.n_dof)[:, : self.dimension]
         return world
 
     def from_world(self, vectors: Array) -> Array:
         """Returns vectors of the world (n, 3) as flat unknowns, theta zero."""
-        flat = np.zeros((len(vectors), self.stride))
+        flat = np.zeros((len(vectors), self.n_dof))
         flat[:, : self.dimension] = vectors[:, self.dims]
         return flat.ravel()
 
@@ -106,7 +106,7 @@ class Spline:
         A start is the index of the first of the unknowns that shape the hose there.
         """
         spans, values = basis.compute_basis(self.knots, arc_lengths)
-        return spans * self.stride, values
+        return spans * self.n_dof, values
 
     def evaluate(self, arc_lengths: Array, flat: Array, derivative: int = 0) -> Array:
         """Returns sum_i N_i(s) p_i, or its first or second derivative by s, in the world frame.
@@ -146,7 +146,7 @@ class Spline:
 
     # -- checks --------------------------------------------------------------------------------
 
-    def find_offset(self, points: Array) -> Array:
+    def compute_offset(self, points: Array) -> Array:
         """Returns the offset (3,) of the plane that points (k, 3) lie in.
 
         Raises:

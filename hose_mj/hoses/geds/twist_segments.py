@@ -1,4 +1,4 @@
-"""The clamps of a hose and the stretches between them, as the kernels of twist.py read them.
+"""The clamps of a hose and the segments between them, as the kernels of twist.py read them.
 
 Made anew whenever a clamp comes or goes. The material stays where it is: a clamp that comes takes
 hold of it as it lies, and one that goes leaves its neighbours with the twist that was between them.
@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from hose_mj.hoses.geds import newton as solver
-from hose_mj.hoses.geds.span import make_span
+from hose_mj.hoses.geds.records import Hose
+from hose_mj.hoses.geds.span import LEAST_TURN_ROOM, make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners, measure_twist
 from hose_mj.hoses.protocol import Array
@@ -25,8 +25,8 @@ _LAGRANGE = [
 ]
 
 
-def make_twist(spline: Spline, hose: solver.Hose, arc_lengths: Sequence[float], x: Array) -> Twist:
-    """Returns clamps with arbitrary directors and stretches without twist.
+def make_twist(spline: Spline, hose: Hose, arc_lengths: Sequence[float], x: Array) -> Twist:
+    """Returns clamps with arbitrary directors and segments without twist.
 
     Args:
         spline: the hose's geometry.
@@ -38,12 +38,12 @@ def make_twist(spline: Spline, hose: solver.Hose, arc_lengths: Sequence[float], 
     starts, values = spline.compute_basis(s)
     n_spans, n_clamps = len(hose.tables.first), len(s)
     flexible = bool(np.all(hose.elasticity.torsional_stiffness > 0.0))
-    is_scalar = spline.stride == 3 and flexible
-    n_stretches = max(n_clamps - 1, 0) if is_scalar else 0
-    ends = np.stack([np.arange(n_stretches), np.arange(n_stretches) + 1], axis=1)
+    is_scalar = spline.n_dof == 3 and flexible
+    n_segments = max(n_clamps - 1, 0) if is_scalar else 0
+    ends = np.stack([np.arange(n_segments), np.arange(n_segments) + 1], axis=1)
     weights = np.array(
         [make_weights(spline, n_spans, s[first], s[last]) for first, last in ends]
-    ).reshape(n_stretches, n_spans, 3)
+    ).reshape(n_segments, n_spans, 3)
     compliance = np.array([measure_compliance(hose, part) for part in weights])
     n_frames = 3 * n_spans + n_clamps if spline.has_theta else 0
     return Twist(
@@ -53,17 +53,17 @@ def make_twist(spline: Spline, hose: solver.Hose, arc_lengths: Sequence[float], 
         directors=make_directors(spline, s, x),
         spin=np.zeros((n_clamps, 2)),
         ends=ends,
-        spans=(starts // spline.stride)[ends],
+        spans=(starts // spline.n_dof)[ends],
         weights=weights,
         compliance=compliance,
-        angle=np.zeros(n_stretches),
-        trial=np.zeros(n_stretches),
-        torque=np.zeros(n_stretches),
+        angle=np.zeros(n_segments),
+        trial=np.zeros(n_segments),
+        torque=np.zeros(n_segments),
         frames=np.zeros((n_frames, 10)),
-        kept=np.zeros((n_frames, 10)),
+        accepted=np.zeros((n_frames, 10)),
         turn_rows=np.zeros(n_clamps, dtype=np.int64),
-        carried=np.zeros((n_stretches, 7)),
-        rows=np.zeros((n_stretches, spline.size + 4 * spline.stride)),
+        transported=np.zeros((n_segments, 7)),
+        rows=np.zeros((n_segments, spline.size + 4 * spline.n_dof)),
     )
 
 
@@ -73,11 +73,11 @@ def make_directors(spline: Spline, arc_lengths: Array, x: Array) -> Array:
     for row, tangent in enumerate(spline.evaluate(arc_lengths, x, 1)):
         length = float(np.linalg.norm(tangent))
         unit = tangent / length if length > 1e-12 else np.eye(3)[0]
-        directors[row] = np.concatenate([unit, find_normal(unit)])
+        directors[row] = np.concatenate([unit, compute_normal(unit)])
     return directors
 
 
-def find_normal(tangent: Array) -> Array:
+def compute_normal(tangent: Array) -> Array:
     """Returns some unit vector (3,) normal to a unit tangent (3,)."""
     away = np.eye(3)[int(np.argmin(np.abs(tangent)))]
     normal = np.cross(tangent, away)
@@ -100,13 +100,13 @@ def make_weights(spline: Spline, n_spans: int, start: float, end: float) -> Arra
     return weights
 
 
-def measure_compliance(hose: solver.Hose, weights: Array) -> float:
-    """Returns the integral of ds / GJ over a stretch, 1 / (N m)."""
+def measure_compliance(hose: Hose, weights: Array) -> float:
+    """Returns the integral of ds / GJ over a segment, 1 / (N m)."""
     return float(np.sum(weights / hose.elasticity.torsional_stiffness))
 
 
-def share_twist(spline: Spline, hose: solver.Hose, new: Twist, old: Twist) -> Array:
-    """Returns the angle (K,) of the new stretches when the material keeps its twist."""
+def share_twist(spline: Spline, hose: Hose, new: Twist, old: Twist) -> Array:
+    """Returns the angle (K,) of the new segments when the material keeps its twist."""
     length = hose.tables.span_length
     angle = np.zeros(len(new.angle))
     for k, ends in enumerate(new.ends):
@@ -128,9 +128,9 @@ def turn_director(twist: Twist, clamp: int, angle: float) -> None:
 
 
 def take_over_twist(
-    spline: Spline, hose: solver.Hose, new: Twist, old: Twist, same: dict[int, int], x: Array
+    spline: Spline, hose: Hose, new: Twist, old: Twist, same: dict[int, int], x: Array
 ) -> None:
-    """Gives new clamps and stretches the material's present angles.
+    """Gives new clamps and segments the material's present angles.
 
     Args:
         spline: the hose's geometry.
@@ -164,19 +164,19 @@ def take_over_twist(
 
 
 def settle(twist: Twist) -> None:
-    """Gives all stretches the moment of their present angle."""
+    """Gives all segments the moment of their present angle."""
     twist.trial[:] = twist.angle
     twist.torque[:] = twist.angle / twist.compliance
 
 
 def join_ends(twist: Twist, spin: float) -> Twist:
-    """Returns the twist of a closed loop: its first leg and its last become one stretch.
+    """Returns the twist of a closed loop: its first piece and its last become one segment.
 
     The directors of its ends are glued at one tangent, so they stay together from then on wherever
     it goes.
 
     Args:
-        twist: of its legs as stretches of an open hose, with clamps at both ends; written.
+        twist: of its pieces as segments of an open hose, with clamps at both ends; written.
         spin: what the last end is turned by before (rad).
     """
     last = len(twist.starts) - 1
@@ -186,7 +186,7 @@ def join_ends(twist: Twist, spin: float) -> Twist:
     between /= np.linalg.norm(between)
     for clamp in (0, last):
         tangent, director = twist.directors[clamp, :3], twist.directors[clamp, 3:]
-        twist.directors[clamp, 3:] = carry_director(tangent, between, director)
+        twist.directors[clamp, 3:] = transport_director(tangent, between, director)
         twist.directors[clamp, :3] = between
     if len(twist.ends) < 2:
         return twist
@@ -202,10 +202,10 @@ def join_ends(twist: Twist, spin: float) -> Twist:
     )
 
 
-def part_ends(spline: Spline, hose: solver.Hose, twist: Twist, x: Array) -> Twist:
-    """Returns the legs of a closed loop as stretches of an open hose; see `join_ends`.
+def part_ends(spline: Spline, hose: Hose, twist: Twist, x: Array) -> Twist:
+    """Returns the pieces of a closed loop as segments of an open hose; see `join_ends`.
 
-    The first leg and the last each get the angle that their compliance asks for, so the material
+    The first piece and the last each get the angle that their compliance asks for, so the material
     between them is where it really is.
     """
     if len(twist.ends) == len(twist.angle):
@@ -230,23 +230,23 @@ def part_ends(spline: Spline, hose: solver.Hose, twist: Twist, x: Array) -> Twis
 def take_over_frames(new: Twist, old: Twist, same: dict[int, int], n_spans: int) -> None:
     """Gives the frames of a hose with theta to a new set of clamps; see `take_over_twist`."""
     first = 3 * n_spans
-    new.kept[:first] = old.kept[:first]
+    new.accepted[:first] = old.accepted[:first]
     for clamp, place in enumerate(new.places):
         row = first + clamp
         if clamp in same:
-            new.kept[row] = old.kept[first + same[clamp]]
+            new.accepted[row] = old.accepted[first + same[clamp]]
             new.spin[clamp] = old.spin[same[clamp]]
             continue
         inside = place - min(int(place), n_spans - 1)
         nearest = int(np.argmin(np.abs(0.5 + 0.5 * _NODES - inside)))
-        near = new.kept[3 * min(int(place), n_spans - 1) + nearest]
+        near = new.accepted[3 * min(int(place), n_spans - 1) + nearest]
         tangent = new.directors[clamp, :3]
-        new.kept[row, :3] = tangent
-        new.kept[row, 6:9] = carry_director(near[:3], tangent, near[6:9])
-    new.frames[:] = new.kept
+        new.accepted[row, :3] = tangent
+        new.accepted[row, 6:9] = transport_director(near[:3], tangent, near[6:9])
+    new.frames[:] = new.accepted
 
 
-def carry_director(start: Array, end: Array, director: Array) -> Array:
+def transport_director(start: Array, end: Array, director: Array) -> Array:
     """Returns a director (3,) after the smallest rotation of the unit vector start to end."""
-    factor = (director @ end) / max(1.0 + float(start @ end), 1e-6)
+    factor = (director @ end) / max(1.0 + float(start @ end), LEAST_TURN_ROOM)
     return np.asarray(director - factor * (start + end))

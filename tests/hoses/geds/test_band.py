@@ -3,9 +3,7 @@ import pytest
 import scipy.linalg
 
 from hose_mj.hoses.geds import band as banded
-from hose_mj.hoses.geds import mechanics
-from hose_mj.hoses.geds import newton as solver
-from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds import kkt, mechanics, records, twist_segments
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import HoseSpec
 
@@ -84,9 +82,9 @@ def make_holds(d, seed=0, with_twist=False):
     hose = mechanics.make_constants(SPEC, spline.knots)
     # Three clamps make two stretches, whose rows a test may fill as it likes.
     clamps = [0.0, 0.5, 1.0] if with_twist else []
-    twist = stretches.make_twist(spline, hose, clamps, np.zeros(spline.size))
+    twist = twist_segments.make_twist(spline, hose, clamps, np.zeros(spline.size))
     twist.rows[:, : N * d] = rng.normal(size=(len(twist.angle), N * d))
-    return solver.Holds(start, rows, *numbers, twist, solver.make_response(0))
+    return records.Constraints(start, rows, *numbers, twist, records.make_response(0))
 
 
 def stack(holds, size):
@@ -109,13 +107,13 @@ def test_solve_with_holds_matches_the_dense_kkt_system(d, with_twist):
         m, n_holds = len(rows), len(holds.start)
         gradient, shift = rng.normal(size=size), np.zeros(m)
         shift[:n_holds] = rng.normal(size=n_holds)
-        work = solver.make_work(N, d, m)
+        work = records.make_work(N, d, m)
         work.band[:] = packed
         work.gradient[:size], work.shift[:m] = gradient, shift
         assert banded.factorize(axes, size, work.band)
-        assert solver.solve_with_holds(axes, holds, 0.0, 0.5, 0, size, work) == solver.DONE
-        kkt = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
-        wanted = np.linalg.solve(kkt, np.concatenate([-gradient, shift]))
+        assert kkt.solve_with_constraints(axes, holds, 0.0, 0.5, 0, size, work) == records.DONE
+        saddle = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
+        wanted = np.linalg.solve(saddle, np.concatenate([-gradient, shift]))
         scale = np.abs(wanted).max()
         np.testing.assert_allclose(work.gradient[:size], wanted[:size], atol=1e-8 * scale)
         np.testing.assert_allclose(work.multipliers, wanted[size:], atol=1e-8 * scale)
@@ -137,22 +135,22 @@ def test_indefinite_matrix_is_solved_only_where_twist_and_holds_make_it_stable(d
         )
         dense = dense - (lowest + 0.02) * np.eye(size)
         packed[:size, 0] -= lowest + 0.02
-        work = solver.make_work(N, d, len(rows))
+        work = records.make_work(N, d, len(rows))
         work.band[:] = packed
         work.gradient[:size] = rng.normal(size=size)
         gradient = work.gradient[:size].copy()
         n_negative = banded.factorize_indefinite(axes, size, work.band, work.signs)
         assert n_negative == np.sum(np.linalg.eigvalsh(dense) < 0.0)
-        verdict = solver.solve_with_holds(axes, holds, 0.0, 0.5, n_negative, size, work)
+        verdict = kkt.solve_with_constraints(axes, holds, 0.0, 0.5, n_negative, size, work)
         twist = rows[n_holds:]
         whole = dense + twist.T @ (twist / softness[n_holds:, None])
         null = scipy.linalg.null_space(rows[:n_holds])
         stable = bool(np.linalg.eigvalsh(null.T @ whole @ null)[0] > 0.0)
-        assert verdict == (solver.DONE if stable else solver.NOT_POSITIVE)
+        assert verdict == (records.DONE if stable else records.NOT_POSITIVE)
         if stable and n_negative > 0:
             n_stable += 1
-            kkt = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
-            wanted = np.linalg.solve(kkt, np.concatenate([-gradient, np.zeros(len(rows))]))
+            saddle = np.block([[dense, -rows.T], [rows, np.diag(softness)]])
+            wanted = np.linalg.solve(saddle, np.concatenate([-gradient, np.zeros(len(rows))]))
             scale = np.abs(wanted).max()
             np.testing.assert_allclose(work.gradient[:size], wanted[:size], atol=1e-6 * scale)
     assert n_stable >= 3
@@ -164,8 +162,8 @@ def test_rows_that_depend_on_each_other_are_refused(d):
     _, packed = make_matrix(d)
     holds = make_holds(d)
     holds.rows[1] = -2.0 * holds.rows[0]
-    work = solver.make_work(N, d, len(holds.start))
+    work = records.make_work(N, d, len(holds.start))
     work.band[:] = packed
     assert banded.factorize(axes, size, work.band)
-    verdict = solver.solve_with_holds(axes, holds, 0.0, 1.0, 0, size, work)
-    assert verdict == solver.DEPENDENT_HOLDS
+    verdict = kkt.solve_with_constraints(axes, holds, 0.0, 1.0, 0, size, work)
+    assert verdict == records.DEPENDENT_CONSTRAINTS

@@ -27,7 +27,7 @@ def lay_on_floor(hose, velocity=None):
 @pytest.mark.parametrize("plane", [None, "xz"])
 def test_hose_dropped_on_a_floor_comes_to_rest_there(make_hose, plane):
     hose = make_hose(plane=plane, damping=0.01)
-    assert hose.add_floor(friction=0.4) == 0
+    assert hose.contacts.add_floor(friction=0.4) == 0
     tilted = [[0.0, 0.0, 0.05], [1.0, 0.0, 0.15]]
     hose.reset(tilted)
     energies = [hose.energies().total]
@@ -39,10 +39,12 @@ def test_hose_dropped_on_a_floor_comes_to_rest_there(make_hose, plane):
     assert energies[-1] == pytest.approx(WEIGHT * REST, rel=1e-3)
     heights = hose.position(np.linspace(0, 1, 21))[:, 2]
     np.testing.assert_allclose(heights, REST, atol=1e-6)
-    np.testing.assert_allclose(hose.contact_forces().sum(axis=0), [0, 0, WEIGHT], atol=1e-6)
-    (reaction,) = hose.contact_reactions()
+    np.testing.assert_allclose(
+        hose.contacts.compute_forces().sum(axis=0), [0, 0, WEIGHT], atol=1e-6
+    )
+    (reaction,) = hose.contacts.list_reactions()
     np.testing.assert_allclose(reaction.force, [0, 0, -WEIGHT], atol=1e-6)
-    middle = hose.position(hose.contact_arc_lengths).mean(axis=0)[0]
+    middle = hose.position(hose.contacts.arc_lengths).mean(axis=0)[0]
     np.testing.assert_allclose(reaction.moment, [0, WEIGHT * middle, 0], atol=1e-3)
 
 
@@ -53,7 +55,7 @@ def test_sliding_hose_stops_after_v_squared_over_two_mu_g(make_hose, plane):
     lay_on_floor(hose, (1.0, 0.0, 0.0))
     hose.step(20)
     assert hose.velocity(0.5)[0, 0] == pytest.approx(1.0 - 0.4 * 9.81 * 0.1, rel=1e-3)
-    assert hose.contact_forces().sum(axis=0)[0] == pytest.approx(-0.4 * WEIGHT, rel=1e-3)
+    assert hose.contacts.compute_forces().sum(axis=0)[0] == pytest.approx(-0.4 * WEIGHT, rel=1e-3)
     hose.step(100)
     assert hose.position(0.0)[0, 0] == pytest.approx(1.0 / (2 * 0.4 * 9.81), rel=5e-3)
     assert abs(hose.velocity(0.5)[0, 0]) < 1e-4
@@ -96,7 +98,7 @@ def test_a_belt_carries_the_hose_along(make_hose):
     np.testing.assert_allclose(hose.velocity(0.5)[0, :2], speed * np.array([0.6, 0.8]), rtol=2e-3)
     hose.step(100)
     np.testing.assert_allclose(hose.velocity(0.5)[0, :2], [0.3, 0.4], atol=1e-4)
-    hose.move_obstacle(0, velocity=(0.0, 0.0, 0.0))
+    hose.contacts.move_obstacle(0, velocity=(0.0, 0.0, 0.0))
     hose.step(100)
     np.testing.assert_allclose(hose.velocity(0.5)[0], 0.0, atol=1e-4)
 
@@ -106,11 +108,13 @@ def test_a_rising_floor_lifts_the_hose(make_hose):
     hose.set_obstacles([FLOOR])
     lay_on_floor(hose)
     for k in range(100):
-        hose.move_obstacle(0, position=(0.0, 0.0, 1e-3 * (k + 1)), velocity=(0.0, 0.0, 0.2))
+        hose.contacts.move_obstacle(
+            0, position=(0.0, 0.0, 1e-3 * (k + 1)), velocity=(0.0, 0.0, 0.2)
+        )
         hose.step()
     assert hose.position(0.5)[0, 2] == pytest.approx(0.1 + REST, abs=1e-4)
     assert hose.velocity(0.5)[0, 2] == pytest.approx(0.2, rel=1e-2)
-    assert hose.contact_forces().sum(axis=0)[2] == pytest.approx(WEIGHT, rel=1e-2)
+    assert hose.contacts.compute_forces().sum(axis=0)[2] == pytest.approx(WEIGHT, rel=1e-2)
 
 
 @pytest.mark.parametrize("plane", [None, "xz"])
@@ -157,7 +161,7 @@ def test_hose_thrown_at_an_obstacle_comes_to_rest(make_hose, kind, speed):
     energies = hose.energies()
     assert energies.total < 0.5 * start
     assert energies.kinetic < 1e-3 * start
-    reactions = hose.contact_reactions()
+    reactions = hose.contacts.list_reactions()
     total = sum(reaction.force for reaction in reactions)
     np.testing.assert_allclose(total[2], -WEIGHT, rtol=0.05)
 
@@ -170,7 +174,7 @@ def test_momentum_lost_is_the_impulse_on_the_obstacle(make_hose):
     impulse, before, most = np.zeros(3), hose.momentum().linear, 0.0
     for _ in range(30):
         hose.step()
-        (reaction,) = hose.contact_reactions()
+        (reaction,) = hose.contacts.list_reactions()
         impulse += reaction.force * hose.timestep
         most = max(most, np.linalg.norm(reaction.force))
     assert most > 1.0
@@ -201,10 +205,12 @@ def test_the_motion_turns_with_the_scene(make_hose):
     other.reset(curve @ turn.T + shift)
     one.step(60)
     other.step(60)
-    assert np.linalg.norm(one.contact_reactions()[0].force) > 0.1
+    assert np.linalg.norm(one.contacts.list_reactions()[0].force) > 0.1
     np.testing.assert_allclose(other.control_points, one.control_points @ turn.T + shift, atol=1e-7)
     np.testing.assert_allclose(
-        other.contact_reactions()[0].moment, turn @ one.contact_reactions()[0].moment, atol=1e-5
+        other.contacts.list_reactions()[0].moment,
+        turn @ one.contacts.list_reactions()[0].moment,
+        atol=1e-5,
     )
 
 
@@ -215,7 +221,7 @@ def test_a_hose_in_a_plane_meets_a_scene_in_space(make_hose):
         hose = make_hose(plane=plane, tolerance=1e-10)
         hose.set_obstacles([ball])
         hose.step(60)
-        assert hose.contact_forces().any()
+        assert hose.contacts.compute_forces().any()
         ends.append(hose.control_points)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
 
@@ -233,7 +239,7 @@ def test_static_hose_over_a_drum_is_where_it_comes_to_rest(make_hose):
     hose.clamp(0.0, (0, 0, 0), (1, 0, 0))
     hose.solve_static(4)
     np.testing.assert_allclose(hose.position(np.linspace(0, 1, 11)), rest, atol=1e-4)
-    carried = hose.contact_forces().sum(axis=0)[2]
+    carried = hose.contacts.compute_forces().sum(axis=0)[2]
     assert 0.2 * WEIGHT < carried < WEIGHT
 
 
@@ -254,14 +260,14 @@ def test_distances_handed_in_do_what_the_shape_does(make_hose):
         hose.reset([[0, 0, 0.02], [1, 0, 0.06]], (0.4, 0.1, 0.0))
         for _ in range(60):
             if handed:
-                heights = hose.position(hose.contact_arc_lengths)[:, 2]
-                hose.set_distances(heights, (0.0, 0.0, 1.0), 0.4)
+                heights = hose.position(hose.contacts.arc_lengths)[:, 2]
+                hose.contacts.set_distances(heights, (0.0, 0.0, 1.0), 0.4)
             hose.step()
-        assert hose.contact_forces().any()
+        assert hose.contacts.compute_forces().any()
         ends.append(hose.control_points)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-8)
-    hose.set_distances(None)
-    assert not hose.contact_forces().any()
+    hose.contacts.set_distances(None)
+    assert not hose.contacts.compute_forces().any()
 
 
 def test_far_obstacles_change_nothing(make_hose):
@@ -282,23 +288,23 @@ def test_snapshot_among_obstacles_restores_bitwise(make_hose, plane):
         [ball, Obstacle(kind="plane", position=(0, 0, -0.3))], ContactLaw(width=1e-4)
     )
     hose.step(40)
-    hose.move_obstacle(0, position=(0.41, 0.0, -0.14))
+    hose.contacts.move_obstacle(0, position=(0.41, 0.0, -0.14))
     saved = hose.snapshot()
     hose.step(20)
     wanted = hose.control_points
     hose.set_obstacles([])
     hose.reset([[0, 0, 0], [0, 0, -1]])
     hose.restore(saved)
-    assert [one.kind for one in hose.obstacles] == ["sphere", "plane"]
-    assert hose.obstacles[0].position[0] == 0.41
+    assert [one.kind for one in hose.contacts.obstacles] == ["sphere", "plane"]
+    assert hose.contacts.obstacles[0].position[0] == 0.41
     hose.step(20)
     np.testing.assert_array_equal(hose.control_points, wanted)
 
 
 def test_obstacles_stay_through_a_reset(make_hose):
     hose = make_hose(plane="xz")
-    hose.add_floor(-0.2)
-    hose.add_floor(-0.1)
+    hose.contacts.add_floor(-0.2)
+    hose.contacts.add_floor(-0.1)
     hose.reset([[0, 3.0, 0], [1, 3.0, 0]])
     hose.step(100)
     assert hose.position(0.5)[0, 2] == pytest.approx(-0.1 + RADIUS, abs=1e-3)
@@ -309,16 +315,16 @@ def test_wrong_obstacles_are_refused(make_hose):
     with pytest.raises(InputError, match="obstacles"):
         hose.set_obstacles(["a box"])
     with pytest.raises(InputError, match="obstacle"):
-        hose.move_obstacle(0, position=(0, 0, 0))
-    hose.add_floor()
+        hose.contacts.move_obstacle(0, position=(0, 0, 0))
+    hose.contacts.add_floor()
     with pytest.raises(InputError, match="position"):
-        hose.move_obstacle(0, position=(0, 0, np.nan))
+        hose.contacts.move_obstacle(0, position=(0, 0, np.nan))
     with pytest.raises(InputError, match="distances"):
-        hose.set_distances(np.zeros(3))
+        hose.contacts.set_distances(np.zeros(3))
     with pytest.raises(InputError, match="distances"):
-        hose.set_distances(np.full(len(hose.contact_arc_lengths), np.nan))
+        hose.contacts.set_distances(np.full(len(hose.contacts.arc_lengths), np.nan))
     with pytest.raises(InputError, match="scheme"):
-        make_hose(scheme="verlet").add_floor()
+        make_hose(scheme="verlet").contacts.add_floor()
 
 
 def test_random_states_among_obstacles_stay_finite():
@@ -335,8 +341,20 @@ def test_random_states_among_obstacles_stay_finite():
                 verdicts += 1
                 np.testing.assert_array_equal(hose.control_points, before)
                 break
-            touched += bool(hose.contact_forces().any())
+            touched += bool(hose.contacts.compute_forces().any())
             assert np.all(np.isfinite(hose.control_points))
             assert np.all(np.isfinite(hose.control_velocities))
     assert touched > 150
     assert verdicts <= 3
+
+
+def test_names_that_moved_to_a_part_say_where(make_hose):
+    hose = make_hose()
+    with pytest.warns(DeprecationWarning, match="add_floor is now GedsHose.contacts.add_floor"):
+        assert hose.add_floor(-1.0) == 0
+    with pytest.warns(DeprecationWarning, match="contacts.obstacles"):
+        assert hose.obstacles is hose.contacts.obstacles
+    with pytest.warns(DeprecationWarning, match="contacts.list_reactions"):
+        assert len(hose.contact_reactions()) == 1
+    with pytest.raises(AttributeError, match="'no_such_name'"):
+        _ = hose.no_such_name

@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import basis, energy, mechanics
-from hose_mj.hoses.geds import newton as solver
+from hose_mj.hoses.geds import basis, energy, mechanics, records, twist_segments
 from hose_mj.hoses.geds import span as spans
-from hose_mj.hoses.geds import twist_segments as stretches
 from hose_mj.hoses.geds.spline import Spline
 
 N, LENGTH = 8, 1.0
@@ -33,12 +31,12 @@ def make_elasticity(*, strain=0.0, curvature=0.0, damping=0.0, ea=50.0, ei=0.05,
 def make_constants(elasticity, tables=TABLES):
     n = len(tables.first) + 3
     mass = basis.make_mass(basis.make_knots(n, LENGTH), np.full((n - 3, 4), 0.1))
-    return solver.Hose(tables, elasticity, mass, 1e-4, 0.0)
+    return records.Hose(tables, elasticity, mass, 1e-4, 0.0)
 
 
 def make_no_twist(hose, d):
     spline = Spline(len(hose.mass), LENGTH, "xy" if d == 2 else None)
-    return stretches.make_twist(spline, hose, [], np.zeros(spline.size))
+    return twist_segments.make_twist(spline, hose, [], np.zeros(spline.size))
 
 
 def make_state(kind, d, seed=0):

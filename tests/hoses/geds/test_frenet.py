@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj import HoseSpec, InputError
-from hose_mj.hoses.geds import basis, energy, frames, mechanics
-from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds import basis, energy, frames, mechanics, twist_segments
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
@@ -62,7 +61,7 @@ def assemble(spline, hose, x, rate=None, step=np.inf, exact=True):
     gradient, band = np.zeros(size + 16), np.zeros((size + 16, 32))
     speed = np.zeros(size + 16)
     speed[:size] = 0.0 if rate is None else rate
-    twist = stretches.make_twist(spline, hose, [], x)
+    twist = twist_segments.make_twist(spline, hose, [], x)
     energy.assemble(AXES, hose, twist, 0.0, x, speed, step, exact, make_span(), gradient, band)
     return gradient[:size], mechanics.make_dense(band, size, 16)
 
@@ -113,10 +112,10 @@ def test_on_a_helix_it_is_the_twist_of_the_material():
     wanted = 0.5 * PLAIN.torsional_stiffness * (0.7 + torsion) ** 2
     assert measure(hose, x)[2] == pytest.approx(wanted, rel=1e-4)
     by_theta = mechanics.make_constants(PLAIN, spline.knots)
-    twist = stretches.make_twist(spline, by_theta, [], x)
+    twist = twist_segments.make_twist(spline, by_theta, [], x)
     twist.frames[0, 6:9] = [-1.0, 0.0, 0.0]
     x[3::4] += torsion * s
-    frames.lay_frames(AXES, by_theta.tables, twist, x, make_span(), twist.frames)
+    frames.transport_frames(AXES, by_theta.tables, twist, x, make_span(), twist.frames)
     twist_energy = energy.compute_energy(
         *(AXES, by_theta.tables, by_theta.elasticity, twist.frames, x),
         *(make_span(), np.zeros((n - 3, 2))),

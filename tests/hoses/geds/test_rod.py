@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import basis, energy, frames, mechanics, rod
-from hose_mj.hoses.geds import integrators as schemes
-from hose_mj.hoses.geds import newton as solver
-from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds import (
+    basis,
+    energy,
+    frames,
+    integrators,
+    mechanics,
+    records,
+    rod,
+    twist_segments,
+)
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import HoseSpec
@@ -49,11 +55,11 @@ def make_unknowns(kind, seed=0):
 
 
 def make_twist(x):
-    twist = stretches.make_twist(SPLINE, HOSE, [], x)
+    twist = twist_segments.make_twist(SPLINE, HOSE, [], x)
     rng = np.random.default_rng(7)
     twist.frames[0, 6:9] = rng.normal(size=3)
-    frames.lay_frames(AXES, HOSE.tables, twist, x, make_span(), twist.frames)
-    twist.kept[:] = twist.frames
+    frames.transport_frames(AXES, HOSE.tables, twist, x, make_span(), twist.frames)
+    twist.accepted[:] = twist.frames
     return twist
 
 
@@ -151,7 +157,7 @@ def test_turning_the_whole_hose_changes_nothing(kind):
     moved = x.reshape(N, 4).copy()
     moved[:, :3] = moved[:, :3] @ turn.T + rng.normal(size=3)
     turned = make_twist(x)
-    for part in (turned.frames, turned.kept):
+    for part in (turned.frames, turned.accepted):
         for k in (0, 3, 6):
             part[:, k : k + 3] = twist.frames[:, k : k + 3] @ turn.T
     assert compute_energy(moved.ravel(), turned) == pytest.approx(
@@ -191,9 +197,9 @@ def test_frames_laid_along_a_helix_turn_with_its_torsion():
     angle = s / speed
     helix = np.stack([radius * np.cos(angle), radius * np.sin(angle), pitch * angle], axis=1)
     x = spline.interpolate(s, helix)
-    twist = stretches.make_twist(spline, hose, [], x)
+    twist = twist_segments.make_twist(spline, hose, [], x)
     twist.frames[0, 6:9] = [-1.0, 0.0, 0.0]
-    frames.lay_frames(AXES, hose.tables, twist, x, make_span(), twist.frames)
+    frames.transport_frames(AXES, hose.tables, twist, x, make_span(), twist.frames)
     count = 3 * (n - 3)
     nodes = (np.cumsum(np.tile(hose.tables.gaps, n - 3)) - 0.5 * hose.tables.gaps[0]) * (
         LENGTH / (n - 3)
@@ -211,17 +217,19 @@ def test_laying_frames_anew_keeps_the_material_at_the_clamps_and_the_twist():
     x = make_unknowns("curved")
     x[3::4] = 0.3 * GREVILLE
     spec_clamps = [0.0, 0.45, LENGTH]
-    twist = stretches.make_twist(SPLINE, HOSE, spec_clamps, x)
+    twist = twist_segments.make_twist(SPLINE, HOSE, spec_clamps, x)
     twist.frames[0, 6:9] = [0.0, 0.0, 1.0]
     span = make_span()
-    frames.lay_frames(AXES, HOSE.tables, twist, x, span, twist.frames)
+    frames.transport_frames(AXES, HOSE.tables, twist, x, span, twist.frames)
     m = len(spec_clamps)
     starts, values = SPLINE.compute_basis(np.array(spec_clamps))
     rows = np.zeros((m, 4, 4))
     rows[:, :, 3] = values[:, 0]
     twist.turn_rows[:] = np.arange(m)
     numbers = np.zeros((3, m))
-    holds = solver.Holds(starts, rows.reshape(m, 16), *numbers, twist, solver.make_response(0))
+    holds = records.Constraints(
+        starts, rows.reshape(m, 16), *numbers, twist, records.make_response(0)
+    )
     # Frames that have gathered a smooth angle, theta that makes up for it.
     nodes = (np.cumsum(np.tile(HOSE.tables.gaps, N - 3)) - 0.5 * HOSE.tables.gaps[0]) * (
         LENGTH / (N - 3)
@@ -235,9 +243,9 @@ def test_laying_frames_anew_keeps_the_material_at_the_clamps_and_the_twist():
     theta = SPLINE.evaluate_theta(np.array(spec_clamps), x)
     holds.before[:] = theta
     before = SPLINE.evaluate_theta(nodes, x, 1) + twist.frames[: len(nodes), 9]
-    state = schemes.make_state(4 * N)
+    state = integrators.make_state(4 * N)
     state.x[:] = x
-    frames.lay_anew(AXES, HOSE, holds, state, span)
+    frames.reset_frames(AXES, HOSE, holds, state, span)
     assert np.all(twist.frames[: len(nodes), 9] == 0.0)
     after = SPLINE.evaluate_theta(nodes, state.x, 1)
     np.testing.assert_allclose(after, before, atol=5e-3)

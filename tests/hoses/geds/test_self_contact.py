@@ -91,9 +91,9 @@ def test_a_straight_hose_does_not_touch_itself(make_hose):
 def test_self_contact_looks_closer_than_a_radius(make_hose):
     hose = make_hose(control_points=12)
     hose.set_obstacles([], ContactLaw(self_contact=True))
-    assert np.max(np.diff(hose.contact_arc_lengths)) < 1.6 * RADIUS
+    assert np.max(np.diff(hose.contacts.arc_lengths)) < 1.6 * RADIUS
     hose.set_obstacles([], ContactLaw())
-    assert len(hose.contact_arc_lengths) == 27
+    assert len(hose.contacts.arc_lengths) == 27
 
 
 def make_crossing(make_hose, **options):
@@ -128,7 +128,7 @@ def test_hoses_that_cross_exchange_their_momentum(make_hose, scheme):
 def test_a_hose_lies_on_another(make_hose):
     lower, upper = make_hose(damping=0.02), make_hose(damping=0.02)
     for hose in (lower, upper):
-        hose.add_floor()
+        hose.contacts.add_floor()
     lower.reset([[0.5, -0.5, RADIUS], [0.5, 0.5, RADIUS]])
     upper.reset([[0, 0, 0.06], [1, 0, 0.06]])
     pair = HosePair(upper, lower, friction=0.5)
@@ -136,9 +136,11 @@ def test_a_hose_lies_on_another(make_hose):
     assert upper.position(0.5)[0, 2] == pytest.approx(3 * RADIUS, abs=0.3 * RADIUS)
     assert upper.energies().kinetic + lower.energies().kinetic < 1e-5
     weight = 0.1 * 9.81
-    carried = upper.contact_reactions()[0].force[2] + pair.force[2]
+    carried = upper.contacts.list_reactions()[0].force[2] + pair.force[2]
     assert carried == pytest.approx(-weight, rel=1e-3)
-    assert lower.contact_reactions()[0].force[2] == pytest.approx(pair.force[2] - weight, rel=1e-3)
+    assert lower.contacts.list_reactions()[0].force[2] == pytest.approx(
+        pair.force[2] - weight, rel=1e-3
+    )
 
 
 def test_a_neighbour_is_part_of_a_snapshot(make_hose):
@@ -164,8 +166,8 @@ def test_wrong_pairs_are_refused(make_hose):
     with pytest.raises(InputError, match="friction"):
         HosePair(hose, make_hose(), friction=-1.0)
     with pytest.raises(InputError, match="neighbour"):
-        hose.set_neighbour(np.zeros((1, 3)), np.zeros((1, 3)), 0.01, 0.0, 1.0)
+        hose.contacts.set_neighbour(np.zeros((1, 3)), np.zeros((1, 3)), 0.01, 0.0, 1.0)
     with pytest.raises(InputError, match="velocities"):
-        hose.set_neighbour(np.zeros((2, 3)), np.zeros((3, 3)), 0.01, 0.0, 1.0)
+        hose.contacts.set_neighbour(np.zeros((2, 3)), np.zeros((3, 3)), 0.01, 0.0, 1.0)
     with pytest.raises(InputError, match="forces"):
         hose.set_push([0.1, 0.2], np.zeros((3, 3)))

@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import contacts as contact_set
 from hose_mj.hoses.geds import shapes
+from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.integrators import make_state
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
@@ -27,15 +28,10 @@ def make_obstacle(kind, rng):
 
 
 def make_row(obstacle):
-    spec = HoseSpec(
-        length=1.0,
-        axial_stiffness=1.0,
-        bending_stiffness=1.0,
-        torsional_stiffness=0.0,
-        linear_density=1.0,
-    )
-    contacts = contact_set.ContactSet(Spline(5, 1.0, None), spec, np.zeros(3), 0.005)
-    contacts.set([obstacle], ContactLaw())
+    spec = HoseSpec(length=1.0, axial_stiffness=1.0, bending_stiffness=1.0, linear_density=1.0)
+    state = make_state(15)
+    contacts = ContactSet(Spline(5, 1.0, None), spec, np.zeros(3), 0.005, state)
+    contacts.set_obstacles([obstacle], ContactLaw())
     return contacts.contact.geoms
 
 

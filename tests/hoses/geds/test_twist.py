@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, mechanics, twist
-from hose_mj.hoses.geds import twist_segments as stretches
+from hose_mj.hoses.geds import basis, mechanics, twist, twist_segments
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
@@ -293,7 +292,7 @@ def measure_variation_error(n):
     hose = mechanics.make_constants(make_spec(), spline.knots)
     places = basis.make_greville(spline.knots)
     x = spline.interpolate(places, space_curve(places))
-    clamps = stretches.make_twist(spline, hose, [0.0, 1.0], x)
+    clamps = twist_segments.make_twist(spline, hose, [0.0, 1.0], x)
     span, step = make_span(), 1e-6
 
     def measure(shape):

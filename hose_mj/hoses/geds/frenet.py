@@ -6,7 +6,7 @@ Theetten, Grisoni, Andriot, Barsky (2008) measure theta from the Frenet normal o
 
 Only for reproduction: the second term has no value where the hose is straight or inflects, and
 r''' of a cubic jumps at the knots (docs/frenet.md). Needs no director, so bending is that of
-bending.py. With c = r''', constant in a span and made of r'' at its outer Gauss points,
+energy.py. With c = r''', constant in a span and made of r'' at its outer Gauss points,
 
     d tau = (dN - (N / D) dD) / D,
     d2 tau = (d2N - (N / D) d2D - d tau dD^T - dD d tau^T) / D
@@ -25,7 +25,7 @@ Rounding alone bends a straight hose by some 1e-14."""
 
 
 @kernel
-def compute_frenet_twist(tables, g, p):  # type: ignore[no-untyped-def]
+def compute_frenet_twist(tables, g, p):
     """Returns tau and 1 / D at Gauss point g of the span whose r' and r'' are in p.
 
     Writes the derivatives of N / D by a, b and c to p.strains[:, 0] and those of D to
@@ -59,7 +59,7 @@ def compute_frenet_twist(tables, g, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def compute_frenet_energy(tables, elasticity, e, p):  # type: ignore[no-untyped-def]
+def compute_frenet_energy(tables, elasticity, e, p):
     """Returns the twisting energy of span e (J), whose r' and r'' are in p."""
     energy = 0.0
     for g in range(3):
@@ -70,7 +70,7 @@ def compute_frenet_energy(tables, elasticity, e, p):  # type: ignore[no-untyped-
 
 
 @kernel
-def _find_slope(tables, e, g, k, i):  # type: ignore[no-untyped-def]
+def _find_slope(tables, e, g, k, i):
     """Derivative of a (k = 0), b (1) or c (2) at Gauss point g by control point i of span e."""
     if k == 0:
         return tables.first[e, g, i]
@@ -81,7 +81,7 @@ def _find_slope(tables, e, g, k, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _find_change(tables, e, g, i, c, p):  # type: ignore[no-untyped-def]
+def _compute_change(tables, e, g, i, c, p):
     """Derivative of tau at Gauss point g by unknown c of control point i of span e."""
     if c == 3:
         return tables.first[e, g, i]
@@ -92,7 +92,7 @@ def _find_change(tables, e, g, i, c, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_frenet(tables, elasticity, e, rate, step, exact, p, gradient, band):  # type: ignore[no-untyped-def]
+def add_frenet(tables, elasticity, e, rate, step, exact, p, gradient, band):
     """Adds force and stiffness of the twist in span e, Kelvin-Voigt terms included.
 
     Args:
@@ -114,21 +114,21 @@ def add_frenet(tables, elasticity, e, rate, step, exact, p, gradient, band):  # 
         stress = torque
         if elasticity.damping_time != 0.0:
             for row in range(16):
-                change = _find_change(tables, e, g, row // 4, row % 4, p)
+                change = _compute_change(tables, e, g, row // 4, row % 4, p)
                 stress += elasticity.damping_time * stiffness * change * rate[start + row]
         viscous = stiffness * (1.0 + elasticity.damping_time / step)
         for row in range(16):
-            change = _find_change(tables, e, g, row // 4, row % 4, p)
+            change = _compute_change(tables, e, g, row // 4, row % 4, p)
             gradient[start + row] += stress * change
             for column in range(row + 1):
-                other = _find_change(tables, e, g, column // 4, column % 4, p)
+                other = _compute_change(tables, e, g, column // 4, column % 4, p)
                 band[start + column, row - column] += viscous * change * other
         if exact != 0.0:
             _add_second_derivatives(tables, e, g, torque * inverse, twist - p.a[g, 3], p, band)
 
 
 @kernel
-def _add_second_derivatives(tables, e, g, stress, torsion, p, band):  # type: ignore[no-untyped-def]
+def _add_second_derivatives(tables, e, g, stress, torsion, p, band):
     """Adds what the torque over D, `stress`, times D d2 tau (see above) makes."""
     for row in range(16):
         for column in range(row + 1):
@@ -146,7 +146,7 @@ def _add_second_derivatives(tables, e, g, stress, torsion, p, band):  # type: ig
 
 
 @kernel
-def _compute_second(tables, g, k, c1, m, c2, torsion, p):  # type: ignore[no-untyped-def]
+def _compute_second(tables, g, k, c1, m, c2, torsion, p):
     """D times the second derivative of tau by coordinates c1 of a, b or c (k) and c2 (of m)."""
     s = p.strains
     second = -(s[k, 0, c1] * s[m, 1, c2] + s[k, 1, c1] * s[m, 0, c2])
@@ -179,7 +179,7 @@ def _compute_second(tables, g, k, c1, m, c2, torsion, p):  # type: ignore[no-unt
 
 
 @kernel
-def _is_floored(p):  # type: ignore[no-untyped-def]
+def _is_floored(p):
     """Whether D is held at its smallest value: then it has no derivative."""
     largest = 0.0
     for c in range(3):

@@ -5,6 +5,7 @@ import pytest
 
 from hose_mj.hoses.geds import contact, mechanics, shapes
 from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.integrators import make_state
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.spec import HoseSpec
@@ -35,8 +36,8 @@ OBSTACLES = {
 
 def make(obstacles, plane=None, **law):
     spline = Spline(N, SPEC.length, plane)
-    contacts = ContactSet(spline, SPEC, np.zeros(3), 0.005)
-    contacts.set(obstacles, ContactLaw(stiffness=1e3, width=0.01, **law))
+    contacts = ContactSet(spline, SPEC, np.zeros(3), 0.005, make_state(spline.size))
+    contacts.set_obstacles(obstacles, ContactLaw(stiffness=1e3, width=0.01, **law))
     return spline, contacts
 
 
@@ -106,7 +107,7 @@ def test_matrix_is_the_derivative_of_sliding_friction(plane):
         x[2::3], rate[2::3] = -0.02, 0.0
     else:
         spline.offset[2] = -0.02
-        contacts.rebuild()
+        contacts.set_closed(False)  # reads the offset anew
     _, matrix, touching = add(spline, contacts, x, rate, rate, STEP, False)
     assert touching == len(contacts.arc_lengths)
     d, step = spline.dimension, 1e-6
@@ -190,12 +191,13 @@ def test_reactions_are_opposite_to_what_the_hose_feels(plane):
     x, rate = draw_state(spline, rng)
     gradient, _, touching = add(spline, contacts, x, rate, rate, STEP, False)
     assert touching > 3
-    reactions = contacts.compute_reactions(x, rate)
+    contacts._state.x[:], contacts._state.v[:] = x, rate
+    reactions = contacts.compute_reactions()
     on_obstacles = reactions[:, :3].sum(axis=0)
     on_points = spline.to_world(-gradient)
     assert np.linalg.norm(on_obstacles) > 1.0
     np.testing.assert_allclose(on_points.sum(axis=0)[dims], -on_obstacles[dims], rtol=1e-12)
-    forces = contacts.compute_world_forces(x, rate)
+    forces = contacts.compute_forces()
     np.testing.assert_allclose(forces.sum(axis=0), -on_obstacles, rtol=1e-12)
     # Moments about the world's origin, each obstacle's from its own position.
     places = spline.to_world(x)
@@ -219,7 +221,8 @@ def test_surface_velocity_is_that_of_a_rigid_body():
     _, contacts = make([ball])
     x = np.zeros((N, 3))
     x[:, 0] = np.linspace(0.0, 1.0, N)
-    force = contacts.compute_world_forces(x.ravel(), np.zeros(3 * N)).sum(axis=0)
+    contacts._state.x[:] = x.ravel()
+    force = contacts.compute_forces().sum(axis=0)
     # omega x arm = (0, 3, 0) x (0, 0, .2) = (.6, 0, 0), far above the slip speed.
     assert force[0] == pytest.approx(0.5 * force[2], rel=0.05)
     assert force[1] == pytest.approx(0.0, abs=1e-12)

@@ -1,0 +1,203 @@
+"""`Dynamics`: the motion of one hose, its time steps and its static equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hose_mj.errors import StepError
+from hose_mj.hoses.geds import energy, frames, integrators, mechanics, newton, records
+from hose_mj.hoses.geds.constraints import ConstraintSet
+from hose_mj.hoses.geds.contact import add_contact
+from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
+from hose_mj.hoses.geds.loads import LoadSet
+from hose_mj.hoses.geds.twist import accept_twist
+from hose_mj.hoses.protocol import Array, Linearization
+from hose_mj.jit import run_kernel
+
+_ENDLESS = float(np.finfo(np.float64).max)
+"""A step that changes no velocity (s), yet is finite: contact takes an infinite one for statics."""
+MOST_LOAD_STEPS = 64
+"""Into so many the loads are divided at most: six halvings of what has failed."""
+_STATIC_TOLERANCE = 1e-10
+"""Of the last move of a control point, in lengths of the hose."""
+_STATIC_ITERATIONS = 400
+"""At half a radian an iteration a tangent may turn thirty times round in so many."""
+_STATIC_TURN = 0.5
+"""Largest turn of a tangent in one static iteration (rad): beats an energy line search near
+inextensibility."""
+_RESET_ITERATIONS = 8
+"""A hose with theta resets its frames after so many iterations; with frames that have gathered
+much of the hose's own turns the iteration crawls."""
+
+
+@dataclass
+class Dynamics:
+    """One hose as the integrators take it, and its clock.
+
+    Attributes:
+        axes: a zero for each unknown of a control point.
+        hose: constants.
+        constraints, loads: what acts on it.
+        limits: when Newton's iteration stops.
+        scheme: the integrator's name.
+        timestep: length of a step (s).
+        state: what a step changes.
+        counts: steps since the last reset, Newton iterations and fallbacks so far, (3,).
+    """
+
+    axes: tuple[float, ...]
+    hose: records.Hose
+    constraints: ConstraintSet
+    loads: LoadSet
+    limits: records.Limits
+    scheme: str
+    timestep: float
+    state: integrators.State
+    counts: np.ndarray
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the last reset (s)."""
+        return int(self.counts[STEPS]) * self.timestep
+
+    def run(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Calls a kernel with what all integrators read and these arguments; returns its answer."""
+        return run_kernel(
+            *(kernel, self.axes, self.hose, self.constraints.rows, self.loads.loads, self.limits),
+            *arguments,
+        )
+
+    def advance(self, n_steps: int) -> None:
+        """Takes n_steps steps; raises `StepError` for one that no fallback finished."""
+        code = integrators.SCHEMES[self.scheme]
+        arguments = (code, self.timestep, n_steps, self.state, self.counts)
+        self.check(self.run(integrators.advance, *arguments))
+
+    def check(self, verdict: int) -> None:
+        """Raises `StepError` unless a step was done."""
+        if verdict != records.DONE:
+            raise StepError(
+                f"the step at t = {self.time:.6g} s failed: {records.VERDICTS[verdict]}; "
+                f"try a time step below {self.timestep:g} s or check holds and loads"
+            )
+
+    # -- statics ---------------------------------------------------------------------------------
+
+    def solve_static(self, load_steps: int) -> None:
+        """Moves the state to equilibrium by Newton's iteration, capped by the tangents' turn.
+
+        The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
+
+        Raises:
+            StepError: no equilibrium was found; the state before is kept.
+        """
+        rows, work = self.constraints.rows, self.make_work()
+        length = self.hose.tables.span_length * len(self.hose.tables.first)
+        tolerance = _STATIC_TOLERANCE * length
+        limits = records.Limits(tolerance, length, _STATIC_ITERATIONS, _STATIC_TURN, False, 1.0)
+        verdict, found = records.NOT_CONVERGED, self.state.x
+        changing = (rows.twist.accepted, rows.twist.spin, rows.before, rows.after)
+        before = [part.copy() for part in changing]
+        while verdict != records.DONE and load_steps <= MOST_LOAD_STEPS:
+            _copy(before, changing)
+            run_kernel(integrators.start_step, self.axes, rows, np.inf)
+            found = self.state.x.copy()
+            for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
+                verdict, found = self._iterate(scale, limits, found, work)
+                if verdict != records.DONE:
+                    break
+            load_steps *= 2
+        if verdict != records.DONE:
+            _copy(before, changing)
+            raise StepError(f"no static equilibrium was found: {records.VERDICTS[verdict]}")
+        for part in self.state:
+            part[:] = 0.0
+        self.state.x[:] = found
+        # Like the end of a step: twist, frames and constraints are what was found.
+        rows.multipliers[:] = work.multipliers[: len(rows.multipliers)]
+        rows.before[:] = rows.after
+        if len(self.axes) == 3:
+            run_kernel(accept_twist, self.axes, rows.twist, self.state.x)
+        elif len(self.axes) == 4:
+            self._accept_frames(self.state, work)
+
+    def _iterate(
+        self, scale: float, limits: records.Limits, x: Array, work: records.Work
+    ) -> tuple[int, Array]:
+        """Newton's iteration at one load; a hose with theta resets its frames now and then."""
+        stage = (np.inf, x.copy(), np.zeros_like(x))
+        state = integrators.make_state(len(x))
+        state.x[:] = x
+        has_theta = len(self.axes) == 4
+        if has_theta:
+            limits = limits._replace(max_iterations=_RESET_ITERATIONS)
+        rows, verdict = self.constraints.rows, records.NOT_CONVERGED
+        for _ in range(_STATIC_ITERATIONS // _RESET_ITERATIONS):
+            verdict, more, fell = run_kernel(
+                *(newton.newton, self.axes, self.hose, stage, rows, 1.0, self.loads.loads),
+                *(scale, limits, state.x, work),
+            )
+            self.counts[ITERATIONS] += more
+            self.counts[FALLBACKS] += fell
+            if not has_theta or verdict not in (records.DONE, records.NOT_CONVERGED):
+                break
+            theta = state.x[3::4].copy()
+            self._accept_frames(state, work)
+            if verdict == records.DONE and np.array_equal(theta, state.x[3::4]):
+                break
+        return verdict, state.x
+
+    def _accept_frames(self, state: integrators.State, work: records.Work) -> None:
+        rows = self.constraints.rows
+        run_kernel(frames.accept_frames, self.axes, self.hose, rows, state, work.span)
+
+    # -- small motions ---------------------------------------------------------------------------
+
+    def make_work(self) -> records.Work:
+        """Returns work arrays for the constraints of now."""
+        n_points = len(self.state.x) // len(self.axes)
+        made: records.Work = records.make_work(n_points, len(self.axes), self.constraints.n_rows)
+        return made
+
+    def build_tangent(self) -> records.Work:
+        """Returns work arrays with dU + C v less moments and contact in the gradient.
+
+        Its derivative is in the band. Forces, gravity, inertia and constraints are left out; so are
+        the derivative of damping and friction and the rank-one terms of the twist.
+        """
+        work, rows, loads = self.make_work(), self.constraints.rows, self.loads.loads
+        x = self.state.x
+        work.rate[: len(x)] = self.state.v
+        run_kernel(integrators.start_step, self.axes, rows, np.inf)
+        run_kernel(
+            *(energy.assemble, self.axes, self.hose, rows.twist, 0.0, x, work.rate, np.inf, True),
+            *(work.span, work.gradient, work.band),
+        )
+        run_kernel(newton.add_moments, self.axes, loads, True, x, work)
+        # Within a step without end nothing changes its velocity, but what slides still rubs.
+        run_kernel(
+            *(add_contact, self.axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
+            *(work.gradient, work.band),
+        )
+        return work
+
+    def linearize(self) -> Linearization:
+        """Returns dense mass, stiffness (of `build_tangent`, with the twist) and constraints."""
+        work, rows = self.build_tangent(), self.constraints.rows
+        size, width = len(self.state.x), 4 * len(self.axes)
+        stiffness = mechanics.make_dense(work.band, size, width)
+        for row, compliance in zip(rows.twist.rows, rows.twist.compliance, strict=True):
+            stiffness += np.outer(row[:size], row[:size]) / compliance
+        work.band[:] = 0.0
+        run_kernel(newton.add_mass, self.axes, self.hose, 1.0, work.band)
+        mass = mechanics.make_dense(work.band, size, width)
+        return Linearization(mass, stiffness, mechanics.make_dense_rows(rows, size, width))
+
+
+def _copy(source: list[Array], target: tuple[Array, ...]) -> None:
+    for part, wanted in zip(target, source, strict=True):
+        part[:] = wanted

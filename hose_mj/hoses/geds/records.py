@@ -1,0 +1,188 @@
+"""Records that the solvers read and write, and the verdicts with which they end.
+
+A solver raises nothing: it returns a verdict, and the boundary (hose.py) turns it into an error.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hose_mj.hoses.geds.basis import Tables
+from hose_mj.hoses.geds.contact_law import Contact
+from hose_mj.hoses.geds.span import Elasticity, Span, make_span
+from hose_mj.hoses.geds.twist import Twist
+from hose_mj.hoses.protocol import Array
+from hose_mj.jit import compiled
+
+DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE, DEPENDENT_CONSTRAINTS = range(5)
+VERDICTS = (
+    "done",
+    "Newton's iteration did not converge",
+    "numbers left the finite range",
+    "no positive definite stiffness was found",
+    "two holds ask for the same thing, or more than the spline can follow there",
+)
+
+
+class Hose(NamedTuple):
+    """Constants of one hose.
+
+    Attributes:
+        tables: quadrature.
+        elasticity: material.
+        mass: per coordinate, band (n, 4).
+        gyration: rotational inertia about the tangent over mass (m^2), for theta.
+        drag_rate: drag per mass c (1/s).
+    """
+
+    tables: Tables
+    elasticity: Elasticity
+    mass: Array
+    gyration: float
+    drag_rate: float
+
+
+class Response(NamedTuple):
+    """Linear answer, within a step, of the bodies that hold a hose to its forces.
+
+    With F the mean force of the constraints on the hose over a step, they demand
+    after - compliance F at its end. A stage knows F as base + share lambda, where lambda
+    are its multipliers.
+
+    Attributes:
+        compliance: (m, m) over all rows, m/N, not always symmetric; (0, 0) for rigid bodies.
+        base: (m,), N, written.
+        share: (1,), written.
+        gathered: sum of the multipliers of the stages, or parts of a step, before, (m,), written.
+        force: F of the last step, (m,), N, written.
+    """
+
+    compliance: Array
+    base: Array
+    share: Array
+    gathered: Array
+    force: Array
+
+
+def make_response(n_rows: int) -> Response:
+    """Returns the response of m = n_rows rows, all compliances zero."""
+    base, gathered, force = np.zeros((3, n_rows))
+    return Response(np.zeros((n_rows, n_rows)), base, np.ones(1), gathered, force)
+
+
+class Constraints(NamedTuple):
+    """m rows of G x = g: clamps, attachments and the joint of a closed loop.
+
+    Attributes:
+        start: index of the first of the 4 d unknowns that a row reads, (m,).
+        rows: their coefficients, (m, 4 d). In a closed loop (m, 8 d): the last 2 d rows, which join
+            its ends (loops.py), also read the last 4 d unknowns.
+        before: g at the beginning of a step, (m,).
+        after: g at its end, (m,).
+        multipliers: lambda at the end of the last step, (m,), written.
+        twist: clamps and the twist between them.
+        response: of the bodies that hold the hose.
+    """
+
+    start: np.ndarray
+    rows: Array
+    before: Array
+    after: Array
+    multipliers: Array
+    twist: Twist
+    response: Response
+
+
+class Loads(NamedTuple):
+    """Dead loads and contact.
+
+    Attributes:
+        force: generalised force on the control points, gravity included, flat (n d,).
+        moment_start: index of the first of the 4 d unknowns at each point moment, (k,).
+        moment_basis: N and dN/ds there, (k, 2, 4).
+        moment: (k, 3) N m; a planar hose reads the first entry.
+        contact: obstacles; see contact.py.
+    """
+
+    force: Array
+    moment_start: np.ndarray
+    moment_basis: Array
+    moment: Array
+    contact: Contact
+
+
+class Limits(NamedTuple):
+    """When to stop.
+
+    Attributes:
+        tolerance: largest move of a control point in the last iteration (m).
+        turn_length: what a change of theta is multiplied by to compare with that (m).
+        max_iterations: Newton iterations at most.
+        rotation_cap: largest turn of a tangent in one iteration (rad).
+        line_search: True to shorten steps that run past the lowest point along them.
+        constraint_weight: weight of G^T G in the matrix, relative to its mean diagonal; above 0
+            where the hose alone has rigid motions (statics). The matrix may be indefinite then, as
+            long as the twist's rank-one terms and the constraints make up for it.
+    """
+
+    tolerance: float
+    turn_length: float
+    max_iterations: int
+    rotation_cap: float
+    line_search: bool
+    constraint_weight: float
+
+
+class Work(NamedTuple):
+    """Work arrays of one hose and the multipliers of its constraints.
+
+    x, X and V are a stage, x_now and v_now a step in the making, flat (n d,): nothing reaches the
+    state before the step is done.
+    """
+
+    span: Span
+    gradient: Array
+    rate: Array
+    band: Array
+    signs: Array
+    lower: Array
+    schur: Array
+    multipliers: Array
+    shift: Array
+    residual: Array
+    step: Array
+    x: Array
+    X: Array
+    V: Array
+    x_now: Array
+    v_now: Array
+
+
+@compiled
+def make_work(n_control_points, n_dof, n_rows):
+    """Returns work arrays for n control points of n_dof unknowns each and m rows.
+
+    The rows are those of the constraints and one for each segment that has twist.
+    """
+    size = n_control_points * n_dof
+    padded = size + 4 * n_dof
+    return Work(
+        make_span(),
+        np.zeros(padded),
+        np.zeros(padded),
+        np.zeros((padded, 8 * n_dof)),
+        np.ones(size),
+        np.zeros((n_rows + 1, padded)),
+        np.zeros((n_rows, n_rows)),
+        np.zeros(n_rows),
+        np.zeros(padded),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+    )

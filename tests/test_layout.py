@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # What each part stands on; the longest prefix of a module's name decides its part.
 _BASE = {
     *("hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets", "hose_mj.extras"),
+    "hose_mj.plugins",
 }
 _SCENES = _BASE | {"hose_mj.hoses.spec"}
 _HOSES = _BASE | {"hose_mj.hoses.spec"}
@@ -28,6 +29,7 @@ FLOORS = {
     "hose_mj.checks": {"hose_mj.errors"},
     "hose_mj.extras": {"hose_mj.errors"},
     "hose_mj.jit": set(),
+    "hose_mj.plugins": {"hose_mj.errors"},
     "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.extras"},
     "hose_mj.hoses.spec": {"hose_mj.errors"},
     "hose_mj.hoses": _HOSES,
@@ -36,14 +38,8 @@ FLOORS = {
     "hose_mj.world": _WORLD,
     "hose_mj.constraints": _CONSTRAINTS,
     "hose_mj.rollout": _CONSTRAINTS | {"hose_mj.constraints", "hose_mj.recording"},
-    "hose_mj.tasks": {"hose_mj.errors", "hose_mj.jit"},
-    "hose_mj.envs": {
-        *("hose_mj.errors", "hose_mj.extras", "hose_mj.jit", "hose_mj.tasks"),
-        "hose_mj.recording",
-    },
-    "hose_learning": {
-        *("hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.envs"),
-        *("hose_mj.tasks", "hose_mj.recording", "hose_mj.extras"),
+    "hose_mj.plugins": {"hose_mj.errors"},
+    "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.extras"},
     },
     "hose_mj.cli": {"hose_mj", "hose_learning"},
 }

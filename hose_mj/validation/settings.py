@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
 
 from hose_mj.hoses.protocol import HoseModel
@@ -22,6 +23,11 @@ MOST_UNSTABLE = 10
 STAGNATION = 0.15
 """A chain's time step is halved, from the largest stable one on, until a halving takes less than
 this fraction off its error."""
+
+
+def has_cable() -> bool:
+    """Says whether this MuJoCo has the composite cable: versions from 4 on have none."""
+    return int(version("mujoco").partition(".")[0]) < 4
 
 
 @dataclass(frozen=True)
@@ -209,7 +215,7 @@ def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> 
     """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them.
 
     An undamped chain with explicit forces need not be tried above twice its limit, known from the
-    highest frequency of a chain of rigid links (docs/mujoco_cable.md): `find_largest_step`.
+    highest frequency of a chain of rigid links (docs/mujoco_cable.md): `compute_largest_step`.
     """
     if model == "geds":
         return [step for step in case.steps if step >= grid.smallest_geds_step]
@@ -217,10 +223,10 @@ def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> 
     while STEP_UNIT / parts[-1] > SMALLEST_STEP:
         parts.append(2 * parts[-3])
     steps = [STEP_UNIT / part for part in parts]
-    return [step for step in steps if step < find_largest_step(scheme, resolution, case)]
+    return [step for step in steps if step < compute_largest_step(scheme, resolution, case)]
 
 
-def find_largest_step(scheme: str, resolution: int, case: Case) -> float:
+def compute_largest_step(scheme: str, resolution: int, case: Case) -> float:
     """Above this time step an undamped chain with explicit forces is surely unstable (s)."""
     spec = case.spec
     if scheme == "discrete" or spec.damping_time > 0.0:

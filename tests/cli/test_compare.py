@@ -18,8 +18,8 @@ from hose_mj.validation import study as compare_study
 from hose_mj.validation.case import Reference
 from hose_mj.validation.cases import CASES, find_cases
 from hose_mj.validation.compare import CaseResult
-from hose_mj.validation.report.output import write_all
-from hose_mj.validation.run import Outcome
+from hose_mj.validation.report.page import write_all
+from hose_mj.validation.run import RunResult
 from hose_mj.validation.settings import Setting
 
 RECORD = {
@@ -195,7 +195,7 @@ def make_motion(models):
     still = np.linspace([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 41)
     points = np.tile(still, (51, 1, 1))
     outcomes = [
-        Outcome(
+        RunResult(
             *(case.id, Setting(model, scheme, n, clamp, step), error, "converged", wall, 1.0, 0),
             *(times, points + np.array([0.0, 0.0, error]), np.tile([1.0, 0.0, error], (51, 1))),
         )

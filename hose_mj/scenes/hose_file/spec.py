@@ -7,7 +7,7 @@ from dataclasses import fields
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import Fitting, HoseSpec
-from hose_mj.scenes.hose_file.toml_table import Table
+from hose_mj.scenes.hose_file.toml_table import TomlTable
 from hose_mj.scenes.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_catalogue
 
 LENGTHS = (1e-3, 1e4)
@@ -22,7 +22,7 @@ _SLENDER = 0.25
 """The radius is at most this fraction of the length."""
 
 
-def read_spec(table: Table) -> HoseSpec:
+def read_spec(table: TomlTable) -> HoseSpec:
     """Returns the hose of a table [hose].
 
     A ready hose (`like`) and a material (`material`) give numbers first; the numbers that stand in
@@ -61,7 +61,7 @@ def read_spec(table: Table) -> HoseSpec:
         raise table.fail(error.thing, error.value, error.valid) from error
 
 
-def _gather(table: Table) -> dict[str, float]:
+def _gather(table: TomlTable) -> dict[str, float]:
     """Numbers of the ready hose, of the material, then of the table itself."""
     given: dict[str, float] = {}
     like, material = table.text("like"), table.text("material")
@@ -78,7 +78,9 @@ def _gather(table: Table) -> dict[str, float]:
     return given
 
 
-def _make_from_section(table: Table, given: dict[str, float], length: float) -> dict[str, float]:
+def _make_from_section(
+    table: TomlTable, given: dict[str, float], length: float
+) -> dict[str, float]:
     """What diameters and a material make, then what was given; keys of `HoseSpec`, outer_radius."""
     stated = {key: value for key, value in given.items() if key in (*_SPEC_KEYS, "outer_radius")}
     if "outer_diameter" not in given:
@@ -109,7 +111,7 @@ def _make_from_section(table: Table, given: dict[str, float], length: float) -> 
     return made | stated
 
 
-def _read_fitting(table: Table, length: float) -> Fitting:
+def _read_fitting(table: TomlTable, length: float) -> Fitting:
     start = table.number("start", least=0.0, most=length)
     end = table.number("end", above=start, most=length)
     values = {key: table.find_number(key, above=0.0) for key in _FITTING_KEYS}

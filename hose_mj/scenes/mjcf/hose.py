@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.spec import LENGTHS, read_spec
-from hose_mj.scenes.hose_file.toml_table import LARGEST_NUMBER, Table
+from hose_mj.scenes.hose_file.toml_table import LARGEST_NUMBER, TomlTable
 from hose_mj.scenes.materials import HOSE_KEYS, MATERIAL_KEYS, read_catalogue
 
 _RADII = {"hose_radius": "outer_diameter", "hose_inner_radius": "inner_diameter"}
@@ -56,7 +56,7 @@ def read_hose(
     values |= {key: 2.0 * given[name] for name, key in _RADII.items() if name in given}
     values |= _find_material(texts, file)
     try:
-        return read_spec(Table(values, file))
+        return read_spec(TomlTable(values, file))
     except InputError as error:
         raise _rename(error, given, file) from error
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -33,6 +33,8 @@ from hose_mj.validation.quasistatic import WIDTH, settle
 ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 """Turns a cylinder's axis to y, across the plane in which hoses are laid."""
 
+_MOTION = partial(Case, gravity=DOWN, scale=LENGTH)
+
 
 def _ease(time: float, ramp: float) -> float:
     """From 0 to 1 within `ramp` (s), at rest before and after: half a cosine."""
@@ -41,16 +43,14 @@ def _ease(time: float, ramp: float) -> float:
 
 def make_released_rod() -> Case:
     """A horizontal cantilever let go."""
-    return Case(
+    return _MOTION(
         id="released-rod",
         title="Released rod: a horizontal cantilever let go",
         about="A straight horizontal cantilever is let go and swings for a second under gravity. "
         "Compared: the place of the tip, largest distance over the second.",
         spec=ROD,
-        gravity=DOWN,
         lay=lay_cantilever,
         probe=read_tip,
-        scale=LENGTH,
         motion=Motion(1.0, 50),
         clamped=True,
     )
@@ -91,17 +91,15 @@ def make_taut_pull() -> Case:
     def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
         hose.move(holds[1], (slack + (taut - slack) * _ease(time, ramp), 0.0, 0.0))
 
-    return Case(
+    return _MOTION(
         id="taut-pull-hose",
         family="taut-pull",
         title="Taut pull: two ends moved apart until the hose is taut, then held",
         about="A sagging hose is let go between two attachments; one is drawn away from .8 to "
         ".995 L within a second and held for another. Compared: the places of the quarter points.",
         spec=replace(ROD, damping_time=0.01),
-        gravity=DOWN,
         lay=lambda hose: lay_between(hose, slack),
         probe=read_places((0.25, 0.5, 0.75)),
-        scale=LENGTH,
         motion=Motion(1.0, 50, drive),
     )
 
@@ -305,7 +303,7 @@ def make_floor_tow() -> Case:
     def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
         hose.move(holds[0], (*compute_tow_place(np.array(time / TOW_TIME)), height))
 
-    return Case(
+    return _MOTION(
         id="floor-tow",
         title="Floor tow: a hose towed slowly along a figure of eight",
         about="A hose on a rough floor, mu = .5, is towed by one end along a figure of eight, 3 "
@@ -313,10 +311,8 @@ def make_floor_tow() -> Case:
         "the work of friction increment by increment. The segments of MuJoCo's cable are round "
         "and roll sideways over the floor; that gap stays whatever their number.",
         spec=_TOWED,
-        gravity=DOWN,
         lay=lay,
         probe=read_places(np.linspace(0.0, 1.0, 11)),
-        scale=LENGTH,
         motion=Motion(TOW_TIME, TOW_SAMPLES, drive),
         models=("geds", "cable"),
         steps=(0.1, 0.05),
@@ -335,7 +331,7 @@ def make_obstacle_drop() -> Case:
     bar = Obstacle(
         kind="cylinder", position=(0.5, 0.0, -0.3), rotation=ACROSS, size=(0.1, 0.2), friction=0.3
     )
-    return Case(
+    return _MOTION(
         id="obstacle-drop",
         title="Obstacle drop: a horizontal cantilever let go above a bar",
         about="A straight horizontal cantilever is let go, falls onto a round bar, mu = .3, and "
@@ -344,10 +340,8 @@ def make_obstacle_drop() -> Case:
         spec=replace(
             ROD, bending_stiffness=0.02, torsional_stiffness=0.02 / 1.3, damping_time=0.02
         ),
-        gravity=DOWN,
         lay=lay_cantilever,
         probe=read_places((0.5, 0.75, 1.0)),
-        scale=LENGTH,
         motion=Motion(1.0, 50),
         clamped=True,
         models=("geds", "cable"),

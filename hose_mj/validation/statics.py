@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -40,6 +41,8 @@ from hose_mj.validation.modes import (
 
 _HOLDS: WeakKeyDictionary[HoseModel, list[Hold]] = WeakKeyDictionary()
 """The holds of a case's hose, from `lay` for `probe`."""
+_CANTILEVER = partial(Case, spec=STOUT, lay=lay_cantilever, clamped=True)
+_IN_SPACE = partial(Case, planar=False, models=("geds",))
 LARGEST_SPIN = 2.0
 """Clamps are spun by at most this at once, which models of rigid segments can follow (rad)."""
 
@@ -52,18 +55,15 @@ def make_heavy_cantilever(gamma: float) -> Case:
         x, _, z = read_tip(hose)
         return np.array([-z / x])
 
-    return Case(
+    return _CANTILEVER(
         id=f"heavy-cantilever-gamma-{gamma:g}",
         family="heavy-cantilever",
         title=f"Heavy cantilever, Gamma = {gamma:g}",
         about="A horizontal cantilever sags under its own weight, Gamma = rho A g L^3 / EI. "
         "Compared: drop of the tip over its distance from the wall, with the elastica.",
-        spec=STOUT,
         gravity=(0.0, 0.0, -gamma * BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**3)),
-        lay=lay_cantilever,
         probe=probe,
         truth=lambda: np.array([reference.heavy_cantilever(gamma)]),
-        clamped=True,
     )
 
 
@@ -76,17 +76,14 @@ def make_tip_load(alpha: float) -> Case:
         x, _, z = read_tip(hose)
         return np.array([LENGTH - x, -z])
 
-    return Case(
+    return _CANTILEVER(
         id=f"tip-load-{alpha:g}",
         family="tip-load",
         title=f"Cantilever with a tip load, P L^2 / EI = {alpha:g}",
         about="A weightless cantilever carries a transverse load at its tip. Compared: axial and "
         "transverse displacement of the tip, with the elastica.",
-        spec=STOUT,
-        lay=lay_cantilever,
         probe=probe,
         truth=lambda: np.array(reference.tip_load(alpha)) * LENGTH,
-        clamped=True,
     )
 
 
@@ -99,18 +96,15 @@ def make_end_moment(turn: float, name: str) -> Case:
         x, _, z = read_tip(hose)
         return np.array([x, -z])
 
-    return Case(
+    return _CANTILEVER(
         id=f"end-moment-{name}",
         family="end-moment",
         title=f"Cantilever rolled up by an end moment, M L / EI = {name}",
         about="A moment at the tip bends a weightless cantilever into an arc of a circle, closed "
         "at 2 pi. Compared: the place of the tip, as a fraction of the length.",
-        spec=STOUT,
-        lay=lay_cantilever,
         probe=probe,
         truth=lambda: np.array(reference.end_moment(turn)) * LENGTH,
         scale=LENGTH,
-        clamped=True,
     )
 
 
@@ -263,7 +257,7 @@ def make_bend(load: float) -> Case:
         hose.solve_static()
         return read_tip(hose)
 
-    return Case(
+    return _IN_SPACE(
         id=f"bend-45-load-{load:g}",
         family="bend-45",
         title=f"45-degree bend, load {load:g}",
@@ -272,9 +266,7 @@ def make_bend(load: float) -> Case:
         spec=spec,
         lay=lay,
         probe=probe,
-        planar=False,
         truth=lambda: np.array(reference.BEND_45[load]),
-        models=("geds",),
         resolutions={"geds": (6, 8, 12)},
         promised={12: 1e-3},
     )
@@ -304,7 +296,7 @@ def make_ring(ratio: float) -> Case:
         twisted = turn_about_x(hose.linearize(), math.atan2(middle[1], middle[2]))
         return np.array([compute_critical_twist(flat, twisted, angle, n_neutral=1)])
 
-    return Case(
+    return _IN_SPACE(
         id=f"ring-twist-{ratio:g}",
         family="ring-twist",
         title=f"Twisted ring (Michell), GJ / EI = {ratio:g}",
@@ -315,7 +307,6 @@ def make_ring(ratio: float) -> Case:
         spec=replace(STOUT, torsional_stiffness=ratio * BENDING_STIFFNESS),
         lay=lay,
         probe=probe,
-        planar=False,
         truth=lambda: np.array([reference.ring_twist(ratio)]),
         # With other ratios the statics of the cable, whose joints mix bending and twist, get stuck.
         models=("geds", "cable") if ratio == 1.0 else ("geds",),
@@ -343,7 +334,7 @@ def make_greenhill(pull: float) -> Case:
         critical = compute_critical_twist(straight, hose.linearize(), moment)
         return np.array([critical * LENGTH / BENDING_STIFFNESS])
 
-    return Case(
+    return _IN_SPACE(
         id=f"greenhill-pull-{pull:g}",
         family="greenhill",
         title=f"Twisted rod under tension (Greenhill), T L^2 / EI = {pull:g}",
@@ -352,7 +343,6 @@ def make_greenhill(pull: float) -> Case:
         spec=STOUT,
         lay=lay,
         probe=probe,
-        planar=False,
         truth=lambda: np.array([reference.greenhill(pull)]),
         # A chain of rigid segments takes no tension from where its ends are.
         models=("geds", "cable") if pull == 0.0 else ("geds",),
@@ -392,7 +382,7 @@ def make_helix() -> Case:
         reaction = hose.reaction(_HOLDS[hose][1])
         return np.array([envelope, reaction.force[0], reaction.moment[0]])
 
-    return Case(
+    return _IN_SPACE(
         id="helix",
         title="Localized helix with 27 turns",
         about="A long rod with 27 turns of twist and a slack of 3 % coils up in its middle. "
@@ -400,9 +390,7 @@ def make_helix() -> Case:
         spec=spec,
         lay=lay,
         probe=probe,
-        planar=False,
         truth=lambda: np.array(reference.solve_localized_helix(rod)),
-        models=("geds",),
         resolutions={"geds": (64, 100, 130)},
         promised={100: 5e-3, 130: 1e-3},
     )
@@ -448,7 +436,7 @@ def make_coil() -> Case:
         longer = float(hose.position(length)[0, 2] - tip[2])
         return np.array([longer / force])
 
-    return Case(
+    return _IN_SPACE(
         id="coil",
         title="Coil spring of 12 turns under an axial wrench",
         about="A hose that is a coil at rest (pitch angle .1) is pulled along its axis, a little. "
@@ -456,9 +444,7 @@ def make_coil() -> Case:
         spec=spec,
         lay=lay,
         probe=probe,
-        planar=False,
         truth=lambda: np.array([reference.coil_softness(spec, radius, pitch_angle)]),
-        models=("geds",),
         resolutions={"geds": (6 * n_turns, 8 * n_turns, 12 * n_turns)},
         promised={8 * n_turns: 5e-3},
     )

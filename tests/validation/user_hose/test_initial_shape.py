@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hose_mj.assets import find_asset
 from hose_mj.scenes.hose_file.grasps import Grasp
 from hose_mj.scenes.hose_file.hose_file import read_hose_file
-from hose_mj.validation.user_hose.initial_shape import bend_between, make_line
+from hose_mj.validation.user_hose.case import bend_between, make_line
 
 OWN = read_hose_file(find_asset("hoses/garden_hose.toml"))
 LENGTH = OWN.spec.length

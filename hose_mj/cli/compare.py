@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -18,6 +18,8 @@ from hose_mj.extras import is_installed, require
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from hose_mj.validation.case import Case
     from hose_mj.validation.study import Study
     from hose_mj.validation.user_hose.study import UserHoseStudy
@@ -222,37 +224,30 @@ def show_progress() -> Iterator[Callable[[str], None]]:
 
 def print_cases(study: Study) -> None:
     """Prints checks and ratios on stdout; and the cable's committed runs, where it cannot run."""
+    from rich.console import Console
+
+    console = Console()
     marks = {True: "[green]ok[/]", False: "[red]failed[/]"}
-    _print_table(
-        "Checks",
-        {"": "left", "what": "left", "value": "right", "limit": "right"},
-        [
-            (marks[c.ok], c.name, f"{c.value:.3g}", f"{c.comparison} {c.limit:g}")
-            for c in study.checks
-        ],
-    )
+    rows = [
+        (marks[c.ok], c.name, f"{c.value:.3g}", f"{c.comparison} {c.limit:g}") for c in study.checks
+    ]
+    _print_table(console, "Checks", ("", "what", ">value", ">limit"), rows)
     if study.ratios:
+        title = "Wall time at equal error, each model at its cheapest setting"
+        ratios = [
+            (
+                *(r.case, f"{100 * r.at_error:g} %", f"{r.wall_ratio:.1f}"),
+                *(r.model_setting.removeprefix("geds, "), r.against_setting),
+            )
+            for r in study.ratios
+        ]
         _print_table(
-            "Wall time at equal error, each model at its cheapest setting",
-            {
-                **{"case": "left", "error": "right", "times cheaper": "right"},
-                **{"GEDS": "left", "against": "left"},
-            },
-            [
-                (
-                    *(r.case, f"{100 * r.at_error:g} %", f"{r.wall_ratio:.1f}"),
-                    *(r.model_setting.removeprefix("geds, "), r.against_setting),
-                )
-                for r in study.ratios
-            ],
+            console, title, ("case", ">error", ">times cheaper", "GEDS", "against"), ratios
         )
     if study.committed is not None:
         cable = study.committed
-        _print_table(
-            f"MuJoCo's cable, committed: run with MuJoCo {cable.mujoco}, not with {cable.here}",
-            {"case": "left", "runs": "right", "smallest error": "right"},
-            cable.summarize(),
-        )
+        title = f"MuJoCo's cable, committed: run with MuJoCo {cable.mujoco}, not {cable.here}"
+        _print_table(console, title, ("case", ">runs", ">smallest error"), cable.summarize())
 
 
 def print_user_hose(study: UserHoseStudy) -> None:
@@ -266,29 +261,21 @@ def print_user_hose(study: UserHoseStudy) -> None:
     for line in describe_findings(study):
         console.print(f"- {line}")
     console.print()
-    names = ("wanted", "model", "resolution", "step", "error", "wall s / sim s")
-    _print_table(
-        "The cheapest setting within a wanted error (of the length)",
-        {name: "left" if name == "model" else "right" for name in names},
-        [make_answer_row(answer, study.cut_short) for answer in study.answers],
-        highlight=False,
-    )
+    title = "The cheapest setting within a wanted error (of the length)"
+    names = (">wanted", "model", ">resolution", ">step", ">error", ">wall s / sim s")
+    rows = [make_answer_row(answer, study.cut_short) for answer in study.answers]
+    _print_table(console, title, names, rows)
 
 
 def _print_table(
-    title: str,
-    columns: Mapping[str, Literal["left", "right"]],
-    rows: Iterable[Iterable[str]],
-    *,
-    highlight: bool = True,
+    console: Console, title: str, columns: Sequence[str], rows: Iterable[Iterable[str]]
 ) -> None:
-    """Prints a table on stdout; each column has its name and the side it is aligned to."""
-    from rich.console import Console
+    """Prints a table; columns whose names begin with ">" are aligned right."""
     from rich.table import Table
 
     table = Table(title=title)
-    for name, side in columns.items():
-        table.add_column(name, justify=side)
+    for name in columns:
+        table.add_column(name.removeprefix(">"), justify="right" if name[:1] == ">" else "left")
     for row in rows:
         table.add_row(*row)
-    Console(highlight=highlight).print(table)
+    console.print(table)

@@ -167,26 +167,26 @@ def _read_hold(table: TomlTable, spec: HoseSpec) -> Grasp:
     return hold
 
 
-def _read_timed(table: TomlTable) -> Timed:
+def _read_times(table: TomlTable) -> tuple[float, float, str]:
+    """The numbers of a `Timed`."""
     start = table.number("start", 0.0, least=0.0, most=LONGEST)
     duration = table.number("duration", least=1e-4, most=LONGEST)
-    return Timed(start, duration, table.word("profile", PROFILES, "smooth"))
+    return start, duration, table.word("profile", PROFILES, "smooth")
 
 
 def _read_move(table: TomlTable, clamped: bool) -> Movement:
-    timed = _read_timed(table)
+    times = _read_times(table)
     to, tangent = _read_position(table, "to"), _read_tangent(table, clamped)
     if to is None and tangent is None:
         raise table.fail("to", None, "three numbers (m), or a tangent, or both")
     table.finish()
-    return Movement(timed.start, timed.duration, timed.profile, to, tangent)
+    return Movement(*times, to, tangent)
 
 
 def _read_spin(table: TomlTable) -> Spin:
-    timed = _read_timed(table)
-    turns = table.number("turns", least=-1e4, most=1e4)
+    spin = Spin(*_read_times(table), table.number("turns", least=-1e4, most=1e4))
     table.finish()
-    return Spin(timed.start, timed.duration, timed.profile, turns)
+    return spin
 
 
 def _read_position(table: TomlTable, key: str) -> Vector | None:

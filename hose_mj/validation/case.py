@@ -42,7 +42,7 @@ UNIT_FREQUENCY = math.sqrt(BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**4))
 
 @dataclass(frozen=True)
 class Motion:
-    """How a dynamic case moves.
+    """The motion of a dynamic case.
 
     Attributes:
         duration: s.

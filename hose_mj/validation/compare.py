@@ -98,7 +98,7 @@ def run_case(
 
 
 def compute_limit_gap(result: CaseResult) -> float | None:
-    """How far MuJoCo's own limit, extrapolated in segments, is from the inextensible reference.
+    """Returns the distance of MuJoCo's own limit, extrapolated in segments, from the reference.
 
     The hinge chain at its finest time step of the two finest resolutions that differ by a factor of
     two, with rk4; its error is of second order in the segment length.

@@ -37,7 +37,7 @@ _MOTION = partial(Case, gravity=DOWN, scale=LENGTH)
 
 
 def _ease(time: float, ramp: float) -> float:
-    """From 0 to 1 within `ramp` (s), at rest before and after: half a cosine."""
+    """Rises from 0 to 1 within `ramp` (s), at rest before and after: half a cosine."""
     return 0.5 - 0.5 * math.cos(math.pi * min(time / ramp, 1.0))
 
 
@@ -273,7 +273,7 @@ def tow_chain(
 
 
 def _tow_chain(n_links: int, n_increments: int) -> Array:
-    """What `make_floor_tow` compares, from the minimiser: (TOW_SAMPLES + 1, 33)."""
+    """Computes with the minimiser what `make_floor_tow` compares: (TOW_SAMPLES + 1, 33), m."""
     start = np.stack([np.linspace(0.0, LENGTH, n_links + 1), np.zeros(n_links + 1)], axis=1)
     path = compute_tow_place(np.arange(1, n_increments + 1) / n_increments)
     slip = 2e-3 * float(np.linalg.norm(path[1] - path[0]))

@@ -29,7 +29,7 @@ Curves = dict[str, tuple[list[float], list[float]]]
 Kind = tuple[str | None, int]
 """A plane or a form of twist, and control points: what steps are timed by."""
 FORMS = ("scalar", "theta")
-"""How GEDS carries twist."""
+"""The two ways in which GEDS carries twist."""
 FLEX_CASE = "released-rod"
 FLEX_SEGMENTS = 20
 FLEX_STEPS = (0.004, 0.002, 0.001)

@@ -30,14 +30,14 @@ N_CONTENDERS = 2
 REFERENCE_POINTS = 48
 """Control points of the references of the cases."""
 BUDGET_SPENT = "the budget was spent"
-"""Why a run did not start any more."""
+"""The reason of a run that did not start any more."""
 N_DRAWN, N_DRAWN_IN_SPACE = 41, 601
 """Points along the hose that are kept for pictures; a coil needs more."""
 
 
 @dataclass
 class RunResult:
-    """What one setting reached in one case.
+    """The result of one setting in one case.
 
     Attributes:
         case: its id.

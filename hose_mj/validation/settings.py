@@ -32,7 +32,7 @@ def has_cable() -> bool:
 
 @dataclass(frozen=True)
 class Setting:
-    """How a model is run.
+    """The numbers and the scheme with which a model is run.
 
     Attributes:
         model: id in `hoses.registry.MODELS`.
@@ -50,7 +50,7 @@ class Setting:
 
     @property
     def planar(self) -> bool:
-        """Whether a GEDS hose moves in a plane; the hinge chain always does, other peers never."""
+        """Says whether GEDS moves in a plane; the hinge chain always does, other peers never."""
         return self.scheme.endswith(", planar")
 
     @property
@@ -212,7 +212,7 @@ def _clamps(model: str, case: Case) -> tuple[bool | None, ...]:
 
 
 def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:
-    """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them.
+    """Lists steps from LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves among them.
 
     An undamped chain with explicit forces need not be tried above twice its limit, known from the
     highest frequency of a chain of rigid links (docs/mujoco_cable.md): `compute_largest_step`.
@@ -227,7 +227,7 @@ def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> 
 
 
 def compute_largest_step(scheme: str, resolution: int, case: Case) -> float:
-    """Above this time step an undamped chain with explicit forces is surely unstable (s)."""
+    """Returns the step (s) above which an undamped chain with explicit forces is unstable."""
     spec = case.spec
     if scheme == "discrete" or spec.damping_time > 0.0:
         return math.inf

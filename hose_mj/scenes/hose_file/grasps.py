@@ -39,7 +39,7 @@ class Timed:
         return self.start + self.duration
 
     def progress(self, time: float) -> float:
-        """How much of it is done at a time: 0 before, 1 after."""
+        """Returns the share of it that is done at a time: 0 before, 1 after."""
         share = min(max((time - self.start) / self.duration, 0.0), 1.0)
         return share if self.profile == "linear" else 0.5 - 0.5 * math.cos(math.pi * share)
 
@@ -92,7 +92,7 @@ class Grasp:
         return (*self.moves, *self.spins)
 
     def position_at(self, time: float) -> Vector:
-        """Where it is at a time (m)."""
+        """Returns its place at a time (m)."""
         here = self.position
         for move in self.moves:
             if move.to is not None:
@@ -108,7 +108,7 @@ class Grasp:
         return aim
 
     def angle_at(self, time: float) -> float:
-        """How far a clamp has been turned about its tangent (rad)."""
+        """Returns the angle by which a clamp has been turned about its tangent (rad)."""
         return math.tau * sum(spin.turns * spin.progress(time) for spin in self.spins)
 
 

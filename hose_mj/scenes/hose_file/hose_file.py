@@ -50,7 +50,7 @@ class Floor:
 
 @dataclass(frozen=True, kw_only=True)
 class UserHose:
-    """What a user's file says.
+    """A user's hose as its file describes it.
 
     Attributes:
         title: one line.
@@ -80,12 +80,12 @@ class UserHose:
 
     @property
     def moves(self) -> bool:
-        """Whether a hold is moved or turned."""
+        """Says whether a hold is moved or turned."""
         return any(hold.changes for hold in self.holds)
 
     @property
     def spins(self) -> bool:
-        """Whether a clamp is turned about its tangent."""
+        """Says whether a clamp is turned about its tangent."""
         return any(hold.spins for hold in self.holds)
 
 

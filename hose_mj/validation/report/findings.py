@@ -1,4 +1,4 @@
-"""What was found about a user's hose, in sentences and cells, for the page and the terminal."""
+"""Sentences and cells that say what was found about a user's hose."""
 
 from __future__ import annotations
 

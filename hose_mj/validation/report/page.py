@@ -282,7 +282,7 @@ def _write_numerics(page: Page, pictures: Pictures) -> None:
 
 
 def _write_method(page: Page, grid: settings.Grid) -> None:
-    """How the peers were treated, and the grid of settings."""
+    """Writes how the peers were treated, and the grid of settings."""
     section = write_text(
         page,
         "How the peers were treated",
@@ -310,7 +310,7 @@ def _write_method(page: Page, grid: settings.Grid) -> None:
 def _write_user_hose(
     page: Page, study: UserHoseStudy, ratios: Sequence[Ratio], pictures: Pictures
 ) -> None:
-    """What was asked, what was found, the pictures, all runs."""
+    """Writes what was asked, what was found, the pictures, all runs."""
     section = page.section("At a glance")
     section.paragraph(study.result.case.about)
     for line in describe_findings(study):

@@ -36,7 +36,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How far the best run of a model stays from the converged hose.
+    """The distance at which the best run of a model stays from the converged hose.
 
     Attributes:
         model: its id.

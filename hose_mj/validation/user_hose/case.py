@@ -30,7 +30,7 @@ REST_POINTS = 48
 _FIRST_MODE = 3.5
 """omega L^2 sqrt(rho A / EI) of a clamped-free beam."""
 _PUSH = 1e-3
-"""By this fraction of the length the hose is bent aside before it comes to rest."""
+"""Amount, as a fraction of the length, by which the hose is bent aside before it comes to rest."""
 _STEPS_TO_REST = 400
 _FLAT = 1e-6
 _PAUSE = 0.04
@@ -92,12 +92,12 @@ def make_case(user: UserHose) -> Case:
 
 
 def starts_at_rest(user: UserHose) -> bool:
-    """Whether a rest shape is to be found, for its own sake or to start from."""
+    """Says whether a rest shape is to be found, for its own sake or to start from."""
     return user.duration is None or user.start == "equilibrium"
 
 
 def compute_fineness(user: UserHose) -> int:
-    """By how much finer than others a hose is to be resolved: two turns of a coil count as one."""
+    """Returns the factor by which a hose is resolved finer: two turns of a coil count as one."""
     return max(1, math.ceil(count_turns(user) / 2.0))
 
 
@@ -181,7 +181,7 @@ def compute_rest_shape(user: UserHose) -> Line:
 
 
 def is_planar(user: UserHose) -> bool:
-    """Whether holds, loads and gravity keep the hose in a plane parallel to x and z."""
+    """Says whether holds, loads and gravity keep the hose in a plane parallel to x and z."""
     places = [hold.position for hold in user.holds] + list(user.shape or ())
     aims = [hold.tangent for hold in user.holds if hold.tangent is not None]
     for move in (move for hold in user.holds for move in hold.moves):
@@ -371,7 +371,7 @@ def _choose_tangents(user: UserHose) -> list[Array]:
 
 
 def _hang(user: UserHose, arc_length: float) -> Array:
-    """Down from an attachment, up to it where most of the hose is before it; x without gravity."""
+    """Returns the tangent at an attachment: down, up where most of the hose is before it, or x."""
     size = np.linalg.norm(user.gravity)
     if size == 0.0:
         return np.array([1.0, 0.0, 0.0])

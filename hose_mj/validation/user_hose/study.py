@@ -95,7 +95,7 @@ GEDS's control points are these times `compute_fineness`.
 
 @dataclass
 class UserHoseStudy:
-    """What was found about a user's hose.
+    """The findings about a user's hose.
 
     Attributes:
         hose: what the file says.
@@ -329,7 +329,7 @@ def make_grid(user: UserHose) -> Grid:
 
 
 def can_spin(setting: Setting, rate: float) -> bool:
-    """Whether a clamp may turn so fast (rad/s) in this setting: see `HoseModel.move`."""
+    """Says whether a clamp may turn so fast (rad/s) in this setting: see `HoseModel.move`."""
     assert setting.timestep is not None
     return setting.model == "geds" or rate * setting.timestep < math.pi
 

@@ -28,7 +28,7 @@ from hose_mj.validation.case import (
     read_places,
     read_tip,
 )
-from hose_mj.validation.quasistatic import WIDTH, settle
+from hose_mj.validation.quasistatic import WIDTH, Chain, settle
 
 ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 """Turns a cylinder's axis to y, across the plane in which hoses are laid."""
@@ -258,7 +258,7 @@ def tow_chain(
     n = len(start)
     h = spec.length / (n - 1)
     drag = friction * spec.linear_density * gravity
-    numbers = (h, spec.axial_stiffness, spec.bending_stiffness, drag, delta, 1e-3 * delta)
+    chain = Chain(h, spec.axial_stiffness, spec.bending_stiffness, drag, delta, 1e-3 * delta)
     x = np.array(start, dtype=np.float64).ravel()
     padded = 2 * n + WIDTH
     work = np.zeros(padded), np.zeros((padded, 2 * WIDTH)), np.zeros((1, padded)), np.zeros(2 * n)
@@ -266,7 +266,7 @@ def tow_chain(
     for k, place in enumerate(path):
         before = x.copy()
         x[-2:] = place
-        if not settle(x, before, numbers, *work):
+        if not settle(x, before, chain, *work):
             raise StepError(f"increment {k} of the tow did not converge")
         shapes[k] = x.reshape(n, 2)
     return shapes

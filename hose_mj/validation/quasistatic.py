@@ -13,6 +13,8 @@ nothing with the hose models but the Cholesky factorization. delta is a small pa
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
@@ -26,11 +28,29 @@ _ITERATIONS = 200
 """Newton steps after which an increment that has not converged is given up."""
 
 
+class Chain(NamedTuple):
+    """A chain on a rough floor.
+
+    Attributes:
+        h: rest length of a link (m).
+        stretch, bend: EA (N) and EI (N m^2).
+        drag: friction per length (N/m).
+        delta: slip below which friction is smoothed (m).
+        tolerance: largest change of a coordinate in a converged Newton step (m).
+    """
+
+    h: float
+    stretch: float
+    bend: float
+    drag: float
+    delta: float
+    tolerance: float
+
+
 @kernel
-def _compute_energy(
-    x: Array, before: Array, h: float, stretch: float, bend: float, drag: float, delta: float
-) -> float:
+def _compute_energy(x: Array, before: Array, chain: Chain) -> float:
     """The function that is minimised (J)."""
+    h, stretch, bend, drag, delta, _ = chain
     n = len(x) // 2
     energy = 0.0
     for i in range(n):
@@ -48,18 +68,9 @@ def _compute_energy(
 
 
 @kernel
-def _build(
-    x: Array,
-    before: Array,
-    h: float,
-    stretch: float,
-    bend: float,
-    drag: float,
-    delta: float,
-    gradient: Array,
-    band: Array,
-) -> None:
+def _build(x: Array, before: Array, chain: Chain, gradient: Array, band: Array) -> None:
     """Writes the gradient and a positive definite second derivative (compression is left out)."""
+    h, stretch, bend, drag, delta, _ = chain
     n = len(x) // 2
     gradient[:] = 0.0
     band[:, :] = 0.0
@@ -109,20 +120,13 @@ def _build(
 
 @compiled
 def settle(
-    x: Array,
-    before: Array,
-    numbers: tuple[float, ...],
-    gradient: Array,
-    band: Array,
-    row: Array,
-    trial: Array,
+    x: Array, before: Array, chain: Chain, gradient: Array, band: Array, row: Array, trial: Array
 ) -> bool:
     """Newton's iteration with a line search on the energy; the last node stays. False if stuck."""
-    h, stretch, bend, drag, delta, tolerance = numbers
     size = len(x)
-    energy = _compute_energy(x, before, h, stretch, bend, drag, delta)
+    energy = _compute_energy(x, before, chain)
     for _ in range(_ITERATIONS):
-        _build(x, before, h, stretch, bend, drag, delta, gradient, band)
+        _build(x, before, chain, gradient, band)
         # The towed node: its unknowns leave the system.
         for k in range(size - 2, size):
             gradient[k] = 0.0
@@ -147,13 +151,13 @@ def settle(
         while True:
             for k in range(size):
                 trial[k] = x[k] + factor * row[0, k]
-            found = _compute_energy(trial, before, h, stretch, bend, drag, delta)
+            found = _compute_energy(trial, before, chain)
             if found <= energy + 1e-4 * factor * slope or factor < 1e-6:
                 break
             factor *= 0.5
         for k in range(size):
             x[k] = trial[k]
         energy = found
-        if largest * factor <= tolerance:
+        if largest * factor <= chain.tolerance:
             return True
     return False

@@ -81,7 +81,7 @@ def _gather(table: TomlTable) -> dict[str, float]:
 def _make_from_section(
     table: TomlTable, given: dict[str, float], length: float
 ) -> dict[str, float]:
-    """Makes numbers of diameters and a material; given ones win. Keys of `HoseSpec`, outer_radius."""
+    """Makes the keys of `HoseSpec`, and outer_radius, of a section; stated ones win."""
     stated = {key: value for key, value in given.items() if key in (*_SPEC_KEYS, "outer_radius")}
     if "outer_diameter" not in given:
         return stated

@@ -395,6 +395,8 @@ def _lay_tail(begin: float, end: float, start: Array, tangent: Array) -> tuple[A
 
 
 def _interpolate(along: Array, points: Array) -> Line:
+    rises = np.append(True, np.diff(along) > 0.0)  # a curve that turns back can stand still
+    along, points = along[rises], points[rises]
     if len(points) < 4:
         return lambda s: np.stack([np.interp(s, along, points[:, k]) for k in range(3)], axis=1)
     return CubicSpline(along, points)  # type: ignore[no-any-return]

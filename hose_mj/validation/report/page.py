@@ -17,9 +17,9 @@ import numpy as np
 from hose_mj.recording.document import format_document
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.page import Block, Page, Picture, Section
+from hose_mj.recording.palette import name_model
 from hose_mj.recording.parquet import write_records
 from hose_mj.recording.plots.api import format_seconds
-from hose_mj.recording.palette import name_model
 from hose_mj.recording.rerun import write_recording
 from hose_mj.validation import settings
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest

@@ -9,8 +9,8 @@ import numpy as np
 
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.recording.episode import HoseTrack, Scene, Series
-from hose_mj.recording.plots import api as plots
 from hose_mj.recording.palette import COLORS
+from hose_mj.recording.plots import api as plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import RunResult
 from hose_mj.validation.study import SHOWN_WITHIN, Study

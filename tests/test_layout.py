@@ -38,8 +38,14 @@ FLOORS = {
     "hose_mj.world": _WORLD,
     "hose_mj.constraints": _CONSTRAINTS,
     "hose_mj.rollout": _CONSTRAINTS | {"hose_mj.constraints", "hose_mj.recording"},
-    "hose_mj.plugins": {"hose_mj.errors"},
-    "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.extras"},
+    "hose_mj.tasks": {"hose_mj.errors", "hose_mj.jit"},
+    "hose_mj.envs": {
+        *("hose_mj.errors", "hose_mj.extras", "hose_mj.jit", "hose_mj.tasks"),
+        "hose_mj.recording",
+    },
+    "hose_learning": {
+        *("hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.envs"),
+        *("hose_mj.tasks", "hose_mj.recording", "hose_mj.extras"),
     },
     "hose_mj.cli": {"hose_mj", "hose_learning"},
 }

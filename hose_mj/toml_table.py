@@ -1,4 +1,4 @@
-"""`Table`: a TOML file read key by key; each mistake is one `InputError` with file, key and values.
+"""`TomlTable`: a TOML file read key by key; a mistake is one `InputError`: file, key, values.
 
 Nothing is trusted: a key is read with what it may be, and `finish` refuses the keys that nobody
 asked for. Quantities are plain numbers in SI units.
@@ -19,7 +19,7 @@ LARGEST_NUMBER = 1e15
 _SHOWN = 80
 
 
-def read_toml(path: Path) -> Table:
+def read_toml(path: Path) -> TomlTable:
     """Reads a TOML file.
 
     Raises:
@@ -37,10 +37,10 @@ def read_toml(path: Path) -> Table:
     except (ValueError, RecursionError) as error:
         why = " ".join(str(error).split())
         raise InputError("file", str(path), f"TOML in UTF-8 ({why})") from error
-    return Table(values, Path(path).name)
+    return TomlTable(values, Path(path).name)
 
 
-class Table:
+class TomlTable:
     """One table of a file.
 
     Args:
@@ -149,16 +149,16 @@ class Table:
             raise self.fail(key, value, "one of " + ", ".join(choices))
         return value
 
-    def table(self, key: str) -> Table | None:
+    def table(self, key: str) -> TomlTable | None:
         """The table below a key; None where there is none."""
         value = self.value(key)
         if value is None:
             return None
         if not isinstance(value, dict):
             raise self.fail(key, value, f"a table, [{key}]")
-        return Table(value, self._file, self._below(key))
+        return TomlTable(value, self._file, self._below(key))
 
-    def tables(self, key: str) -> tuple[Table, ...]:
+    def tables(self, key: str) -> tuple[TomlTable, ...]:
         """The tables of an array, or the one table, below a key; none where there is nothing."""
         value = self.value(key)
         if value is None:
@@ -167,7 +167,7 @@ class Table:
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise self.fail(key, value, f"tables, [[{self._below(key)}]]")
         return tuple(
-            Table(row, self._file, f"{self._below(key)}[{k}]") for k, row in enumerate(rows)
+            TomlTable(row, self._file, f"{self._below(key)}[{k}]") for k, row in enumerate(rows)
         )
 
     def finish(self) -> None:

@@ -53,8 +53,8 @@ def test_the_materials_are_found_in_the_wheel(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path)
     code = (
         "from hose_mj.assets import find_assets;"
-        "from hose_mj.scenes.hose_file.hose_file import read_own_hose;"
-        "print(find_assets(), read_own_hose(find_assets() / 'hoses' / 'usb_cable.toml').title)"
+        "from hose_mj.scenes.hose_file.hose_file import read_hose_file;"
+        "print(find_assets(), read_hose_file(find_assets() / 'hoses' / 'usb_cable.toml').title)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code],

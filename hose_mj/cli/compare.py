@@ -5,24 +5,29 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from hose_mj.checks import Check
 from hose_mj.errors import InputError
+from hose_mj.extras import is_installed, require
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_mj.scenes.hose_file.hose_file import OwnHose
+    from rich.console import Console
+
     from hose_mj.validation.case import Case
-    from hose_mj.validation.compare import Ratio
+    from hose_mj.validation.study import Study
+    from hose_mj.validation.user_hose.study import UserHoseStudy
 
 MODELS = ("geds", "cable", "flex", "hinge-chain")
+OUT = Path("out/compare")
+QUICK_SHARE = 1.0 / 3.0
+"""Of its budget that a user's hose gets with --quick."""
 _MY_HOSE = tyro.conf.arg(metavar="[MY_HOSE.toml]")
 
 
@@ -45,8 +50,9 @@ class Args:
         MODELS
     )
     """Models to run."""
-    out: Path = Path("out/compare")
-    """Folder for the report, the plots, the numbers and the recording."""
+    out: Path = OUT
+    """Folder for the report, the plots, the numbers and the recording. With --json alone nothing
+    is written there where the extras report and viewer are not installed."""
     quick: bool = False
     """A smaller grid, about two minutes once compiled. For your own hose:
     a third of its budget."""
@@ -58,60 +64,99 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs the comparison; 1 if a check failed."""
-    from hose_mj.cli.compare_own import choose_own_models, print_own, study_own_hose
-    from hose_mj.validation.report.output import write_all
-    from hose_mj.validation.study import run_study
-
-    own = None if args.my_hose is None else check_own_arguments(args, args.my_hose)
-    cases = check_arguments(args) if own is None else ()
+    with_report = check_report(args)
+    users = args.my_hose
+    measure = prepare_cases(args) if users is None else prepare_user_hose(args, users)
+    if with_report:
+        make_folder(args.out)
     begun = time.perf_counter()
+    where = "none, for want of the extras report and viewer"
     with show_progress() as advance:
-        if own is not None:
-            study = study_own_hose(own, choose_own_models(args.models), advance)
-        else:
-            study = run_study(
-                cases,
-                tuple(dict.fromkeys(args.models)),
-                quick=args.quick,
-                seed=args.seed,
-                with_numerics=not args.cases and "geds" in args.models,
-                advance=advance,
-            )
+        study = measure(advance)
         results = {
-            "records": [outcome.to_record() for outcome in study.outcomes],
+            "records": study.list_records(),
             "ratios": [asdict(ratio) for ratio in study.ratios],
             "skipped": study.list_skipped(),
         }
-        if study.own is not None:
-            results |= study.own.to_results()
+        if study.user is not None:
+            results |= study.user.to_results()
         document = make_document("compare", args, checks=study.checks, results=results)
-        advance("report")
-        report = write_all(study, document, args.out)
+        if with_report:
+            from hose_mj.validation.report.page import write_all
+
+            advance("report")
+            where = str(write_all(study, document, args.out).resolve())
     if args.json:
         print_document(document)
-    elif study.own is not None:
-        print_own(study.own)
+    elif study.user is not None:
+        print_user_hose(study.user)
     else:
-        _summarize(study.checks, study.ratios)
+        print_cases(study)
     failed = [check for check in study.checks if not check.ok]
     seconds = time.perf_counter() - begun
     passed = f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok"
     stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed}, {seconds:.0f} s\nreport: {report.resolve()}", file=stream)
+    print(f"{passed}, {seconds:.0f} s\nreport: {where}", file=stream)
     return 1 if failed else 0
 
 
+def check_report(args: Args) -> bool:
+    """Says whether a report is written; not for --json alone where what it needs is missing.
+
+    Raises:
+        MissingExtra: one is wanted, and what it needs is not installed.
+    """
+    if args.json and args.out == OUT and not (is_installed("report") and is_installed("viewer")):
+        return False
+    require("report", "the report of a comparison")
+    require("viewer", "the recording of a comparison")
+    return True
+
+
+def prepare_cases(args: Args) -> Callable[[Callable[[str], None]], Study]:
+    """Checks all arguments; returns what runs the cases, told by its argument what comes next.
+
+    Raises:
+        InputError: as in `check_arguments`.
+    """
+    from hose_mj.validation.settings import has_cable
+    from hose_mj.validation.study import read_committed_cable, run_study
+
+    cases = check_arguments(args)
+    left_out = args.models == MODELS and not has_cable()
+    models = tuple(m for m in dict.fromkeys(args.models) if m != "cable" or not left_out)
+
+    def measure(advance: Callable[[str], None]) -> Study:
+        study = run_study(
+            cases,
+            models,
+            quick=args.quick,
+            seed=args.seed,
+            with_numerics=not args.cases and "geds" in models,
+            advance=advance,
+        )
+        study.committed = read_committed_cable(cases) if left_out else None
+        return study
+
+    return measure
+
+
 def check_arguments(args: Args) -> tuple[Case, ...]:
-    """Returns the cases to run, those that some chosen model runs; makes the folder `out`.
+    """Returns the cases to run, those that some chosen model runs.
 
     Raises:
         InputError: an unknown case or model, no case left, a bad seed or folder.
     """
     from hose_mj.validation.cases import find_cases
+    from hose_mj.validation.settings import has_cable
 
     for model in args.models:
         if model not in MODELS:
             raise InputError("model", model, ", ".join(MODELS))
+    if "cable" in args.models and args.models != MODELS and not has_cable():
+        others = ", ".join(model for model in MODELS if model != "cable")
+        valid = f"{others} with this MuJoCo, which has no cable (without --models: as committed)"
+        raise InputError("model", "cable", valid)
     if not args.models:
         raise InputError("models", args.models, f"one or more of {', '.join(MODELS)}")
     _check_seed(args.seed)
@@ -120,25 +165,27 @@ def check_arguments(args: Args) -> tuple[Case, ...]:
     if not cases:
         run_with = dict.fromkeys(model for case in found for model in case.models)
         raise InputError("models", args.models, f"for these cases one of {', '.join(run_with)}")
-    make_folder(args.out)
     return cases
 
 
-def check_own_arguments(args: Args, path: Path) -> OwnHose:
-    """Returns the user's hose; makes the folder `out`.
+def prepare_user_hose(args: Args, path: Path) -> Callable[[Callable[[str], None]], Study]:
+    """Checks all arguments, returns what runs a user's hose.
 
     Raises:
         InputError: something wrong in the file, an unknown model, a bad seed or folder; cases.
     """
-    from hose_mj.cli.compare_own import choose_own_models, read_own
+    from hose_mj.scenes.hose_file.hose_file import find_hose_file, read_hose_file
+    from hose_mj.validation.study import study_user_hose
+    from hose_mj.validation.user_hose.study import check_models, list_models
 
     if args.cases:
         raise InputError("cases", args.cases, "none beside a hose of your own")
-    choose_own_models(args.models)
+    models = list_models() if args.models == MODELS else check_models(args.models)
     _check_seed(args.seed)
-    own = read_own(path, quick=args.quick)
-    make_folder(args.out)
-    return own
+    hose = read_hose_file(find_hose_file(path))
+    if args.quick:
+        hose = replace(hose, budget=hose.budget * QUICK_SHARE)
+    return lambda advance: study_user_hose(hose, models, advance)
 
 
 def _check_seed(seed: int) -> None:
@@ -162,7 +209,7 @@ def make_folder(out: Path) -> None:
 
 
 @contextmanager
-def show_progress() -> Iterator[Any]:
+def show_progress() -> Iterator[Callable[[str], None]]:
     """A line on stderr that says what is being run; nothing where that is no terminal."""
     from rich.console import Console
     from rich.status import Status
@@ -175,29 +222,60 @@ def show_progress() -> Iterator[Any]:
         yield status.update
 
 
-def _summarize(checks: list[Check], ratios: list[Ratio]) -> None:
+def print_cases(study: Study) -> None:
+    """Prints checks and ratios on stdout; and the cable's committed runs, where it cannot run."""
     from rich.console import Console
-    from rich.table import Table
 
     console = Console()
-    table = Table(title="Checks")
-    for name in ("", "what", "value", "limit"):
-        table.add_column(name, justify="left" if name in ("", "what") else "right")
-    for check in checks:
-        mark = "[green]ok[/]" if check.ok else "[red]failed[/]"
-        table.add_row(mark, check.name, f"{check.value:.3g}", f"{check.comparison} {check.limit:g}")
-    console.print(table)
-    if not ratios:
-        return
-    table = Table(title="Wall time at equal error, each model at its cheapest setting")
-    for name in ("case", "error", "times cheaper", "GEDS", "against"):
-        table.add_column(name, justify="right" if name in ("error", "times cheaper") else "left")
-    for ratio in ratios:
-        table.add_row(
-            ratio.case,
-            f"{100 * ratio.at_error:g} %",
-            f"{ratio.wall_ratio:.1f}",
-            ratio.model_setting.removeprefix("geds, "),
-            ratio.against_setting,
+    marks = {True: "[green]ok[/]", False: "[red]failed[/]"}
+    rows = [
+        (marks[c.ok], c.name, f"{c.value:.3g}", f"{c.comparison} {c.limit:g}") for c in study.checks
+    ]
+    _print_table(console, "Checks", ("", "what", ">value", ">limit"), rows)
+    if study.ratios:
+        title = "Wall time at equal error, each model at its cheapest setting"
+        ratios = [
+            (
+                *(r.case, f"{100 * r.at_error:g} %", f"{r.wall_ratio:.1f}"),
+                *(r.model_setting.removeprefix("geds, "), r.against_setting),
+            )
+            for r in study.ratios
+        ]
+        _print_table(
+            console, title, ("case", ">error", ">times cheaper", "GEDS", "against"), ratios
         )
+    if study.committed is not None:
+        cable = study.committed
+        title = f"MuJoCo's cable, committed: run with MuJoCo {cable.mujoco}, not {cable.here}"
+        _print_table(console, title, ("case", ">runs", ">smallest error"), cable.summarize())
+
+
+def print_user_hose(study: UserHoseStudy) -> None:
+    """Prints what was found, on stdout."""
+    from rich.console import Console
+
+    from hose_mj.validation.report.findings import describe_findings, make_answer_row
+
+    console = Console(highlight=False)
+    console.print(f"[bold]{study.hose.title}[/]\n{study.result.case.about}\n")
+    for line in describe_findings(study):
+        console.print(f"- {line}")
+    console.print()
+    title = "The cheapest setting within a wanted error (of the length)"
+    names = (">wanted", "model", ">resolution", ">step", ">error", ">wall s / sim s")
+    rows = [make_answer_row(answer, study.cut_short) for answer in study.answers]
+    _print_table(console, title, names, rows)
+
+
+def _print_table(
+    console: Console, title: str, columns: Sequence[str], rows: Iterable[Iterable[str]]
+) -> None:
+    """Prints a table; columns whose names begin with ">" are aligned right."""
+    from rich.table import Table
+
+    table = Table(title=title)
+    for name in columns:
+        table.add_column(name.removeprefix(">"), justify="right" if name[:1] == ">" else "left")
+    for row in rows:
+        table.add_row(*row)
     console.print(table)

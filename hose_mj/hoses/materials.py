@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hose_mj.assets import find_asset
 from hose_mj.errors import InputError
-from hose_mj.toml_table import Table, read_toml
+from hose_mj.toml_table import TomlTable, read_toml
 
 MATERIAL_KEYS = ("youngs_modulus", "poisson_ratio", "density", "damping_time")
 HOSE_KEYS = (
@@ -75,7 +75,7 @@ def find_entry(entries: Mapping[str, Entry], name: str, thing: str) -> Entry:
 
 
 def _read_entries(
-    file: Table, kind: str, keys: tuple[str, ...], materials: Mapping[str, Entry]
+    file: TomlTable, kind: str, keys: tuple[str, ...], materials: Mapping[str, Entry]
 ) -> dict[str, Entry]:
     entries = {}
     group = file.table(kind)

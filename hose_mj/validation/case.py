@@ -1,9 +1,9 @@
-"""What a case is, the hoses that cases use, and how they are laid."""
+"""What a case is, the hoses that cases use, how they are laid and read."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -34,13 +34,15 @@ CHAIN = replace(STOUT, axial_stiffness=1e5, bending_stiffness=1e-7, torsional_st
 STIFFENING = 1e3
 """EA of the reference for inextensible models, over that of the case."""
 GRAVITY = 9.81
+DOWN = (0.0, 0.0, -GRAVITY)
+"""The gravity of most motions (m/s^2)."""
 WEIGHT = LINEAR_DENSITY * GRAVITY * LENGTH
 UNIT_FREQUENCY = math.sqrt(BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**4))
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How a dynamic case moves.
+    """The motion of a dynamic case.
 
     Attributes:
         duration: s.
@@ -75,13 +77,13 @@ class Case:
 
     Attributes:
         id: stable; a parameter stands behind the family's name and a dash.
-        family: the id without its parameter.
         title: one line.
         about: what is done, what is compared, against what.
         spec: the hose.
-        gravity: (3,) m/s^2.
         lay: puts a fresh hose into its initial state and returns its holds.
         probe: what is compared, (q,); for static cases it finds the equilibrium itself.
+        family: the id without its parameter; by default the id.
+        gravity: (3,) m/s^2.
         truth: closed form of the probe, (q,); None where the reference is the converged limit.
         scale: what errors are a fraction of: None for the reference's own value, else a length (m).
         motion: None for static cases.
@@ -102,13 +104,13 @@ class Case:
     """
 
     id: str
-    family: str
     title: str
     about: str
     spec: HoseSpec
-    gravity: tuple[float, float, float]
     lay: Callable[[HoseModel], list[Hold]]
     probe: Callable[[HoseModel], Array]
+    family: str = ""
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     truth: Callable[[], Array] | None = None
     scale: float | None = None
     motion: Motion | None = None
@@ -124,6 +126,9 @@ class Case:
     uncertainty: float = 1e-4
     promise: float | None = None
     has_ratios: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "family", self.family or self.id)
 
 
 def lay_straight(hose: HoseModel) -> None:
@@ -149,9 +154,16 @@ def lay_pinned(hose: HoseModel) -> list[Hold]:
     return [hose.attach(0.0, (0.0, 0.0, 0.0))]
 
 
-def find_tip(hose: HoseModel) -> Array:
+def read_tip(hose: HoseModel) -> Array:
     """Returns the place of the far end (3,), m."""
     return np.asarray(hose.position(hose.spec.length)[0])
+
+
+def read_places(
+    shares: Sequence[float] | Array, length: float = LENGTH
+) -> Callable[[HoseModel], Array]:
+    """Returns a probe of the places at these shares of the length (m), (3 k,)."""
+    return lambda hose: np.asarray(hose.position(np.array(shares) * length).ravel())
 
 
 @cache

@@ -1,71 +1,85 @@
 """The cases of `hose-mj compare`, as data: a hose, what is done to it, what is read off, the truth.
 
 A case is `static` (an equilibrium, frequencies or a critical load, compared with a closed form) or
-`dynamic` (a motion, compared with its converged limit). Add one by adding a record to `CASES`.
+`dynamic` (a motion, compared with its converged limit). Add one by adding a record to `CASES`, or,
+from another package, by an entry point in the group `hose_mj.cases`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 
 from hose_mj.errors import InputError
+from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.validation import motions, statics
 from hose_mj.validation.case import Case
-from hose_mj.validation.contacts import make_capstan, make_floor_tow, make_obstacle_drop
-from hose_mj.validation.motions import (
-    make_free_flight,
-    make_released_rod,
-    make_suture_pull,
-    make_taut_pull,
-)
-from hose_mj.validation.statics import (
-    make_catenary,
-    make_end_moment,
-    make_euler_buckling,
-    make_frequencies,
-    make_hanging_chain,
-    make_heavy_cantilever,
-    make_tip_load,
-)
-from hose_mj.validation.twisted import (
-    make_bend,
-    make_coil,
-    make_greenhill,
-    make_helix,
-    make_ring,
-)
 
 CASES: tuple[Case, ...] = (
-    *(make_heavy_cantilever(gamma) for gamma in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)),
-    *(make_tip_load(alpha) for alpha in (1.0, 2.0, 5.0, 10.0)),
-    make_end_moment(math.pi, "pi"),
-    make_end_moment(2.0 * math.pi, "2pi"),
-    *(make_frequencies(ends) for ends in ("clamped-free", "free-free", "clamped-pinned")),
-    make_hanging_chain(),
-    make_catenary(),
-    *(make_euler_buckling(ends) for ends in ("clamped-free", "pinned")),
-    *(make_bend(load) for load in (300.0, 600.0)),
-    *(make_ring(ratio) for ratio in (0.5, 0.75, 1.0, 1.25)),
-    *(make_greenhill(pull) for pull in (0.0, 10.0, 100.0)),
-    make_helix(),
-    make_coil(),
-    make_free_flight(),
-    make_released_rod(),
-    make_taut_pull(),
-    make_suture_pull(),
-    make_capstan(),
-    make_floor_tow(),
-    make_obstacle_drop(),
+    *(statics.make_heavy_cantilever(gamma) for gamma in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)),
+    *(statics.make_tip_load(alpha) for alpha in (1.0, 2.0, 5.0, 10.0)),
+    statics.make_end_moment(math.pi, "pi"),
+    statics.make_end_moment(2.0 * math.pi, "2pi"),
+    *(statics.make_frequencies(ends) for ends in ("clamped-free", "free-free", "clamped-pinned")),
+    statics.make_hanging_chain(),
+    statics.make_catenary(),
+    *(statics.make_euler_buckling(ends) for ends in ("clamped-free", "pinned")),
+    *(statics.make_bend(load) for load in (300.0, 600.0)),
+    *(statics.make_ring(ratio) for ratio in (0.5, 0.75, 1.0, 1.25)),
+    *(statics.make_greenhill(pull) for pull in (0.0, 10.0, 100.0)),
+    statics.make_helix(),
+    statics.make_coil(),
+    motions.make_free_flight(),
+    motions.make_released_rod(),
+    motions.make_taut_pull(),
+    motions.make_suture_pull(),
+    motions.make_capstan(),
+    motions.make_floor_tow(),
+    motions.make_obstacle_drop(),
 )
+
+
+@cache
+def list_plugin_cases() -> tuple[Case, ...]:
+    """Returns the cases of other packages: what their entry points in `hose_mj.cases` name.
+
+    An entry point is a `Case`, or a callable without arguments that returns some.
+
+    Raises:
+        InputError: an entry point that cannot be imported or is neither, or an id that is taken.
+    """
+    cases: list[Case] = []
+    for name, entry in find_plugins("hose_mj.cases").items():
+        loaded = load_plugin(entry, (Case, Callable))  # type: ignore[arg-type]
+        added = [loaded] if isinstance(loaded, Case) else list(loaded())
+        for case in added:
+            if not isinstance(case, Case):
+                valid = "a Case, or a callable that returns a list of Case"
+                raise InputError(f"entry point {name!r} in hose_mj.cases", case, valid)
+            if any(case.id == other.id for other in (*CASES, *cases)):
+                raise InputError(
+                    f"id of a case of entry point {name!r}", case.id, "an id of its own"
+                )
+            cases.append(case)
+    return tuple(cases)
 
 
 def find_cases(ids: tuple[str, ...]) -> tuple[Case, ...]:
     """Returns the cases of these ids, in the order of `CASES`; a family's name selects all of it.
 
+    Without ids all of `CASES`; those of other packages (`list_plugin_cases`) run when asked for.
+
     Raises:
         InputError: an id that is neither a case nor a family.
     """
+    if not ids:
+        return CASES
+    known = CASES
+    if any(all(name not in (case.id, case.family) for case in CASES) for name in ids):
+        known = (*CASES, *list_plugin_cases())
     for name in ids:
-        if not any(name in (case.id, case.family) for case in CASES):
-            families = list(dict.fromkeys(case.family for case in CASES))
+        if not any(name in (case.id, case.family) for case in known):
+            families = list(dict.fromkeys(case.family for case in known))
             raise InputError("case", name, f"{', '.join(families)}, or one with its parameter")
-    return tuple(case for case in CASES if not ids or {case.id, case.family} & set(ids))
+    return tuple(case for case in known if {case.id, case.family} & set(ids))

@@ -13,7 +13,7 @@ from hose_mj.hoses.registry import MODELS
 from hose_mj.validation.case import Case, Reference
 from hose_mj.validation.run import (
     EQUAL_ERRORS,
-    Outcome,
+    RunResult,
     Skipped,
     compute_reference,
     run_ladder,
@@ -62,7 +62,7 @@ class CaseResult:
     """
 
     case: Case
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[RunResult] = field(default_factory=list)
     skipped: list[Skipped] = field(default_factory=list)
     stretchable: Reference | None = None
     inextensible: Reference | None = None
@@ -99,12 +99,12 @@ def run_case(
 
 
 def compute_limit_gap(result: CaseResult) -> float | None:
-    """How far MuJoCo's own limit, extrapolated in segments, is from the inextensible reference.
+    """Returns the distance of MuJoCo's own limit, extrapolated in segments, from the reference.
 
     The hinge chain at its finest time step of the two finest resolutions that differ by a factor of
     two, with rk4; its error is of second order in the segment length.
     """
-    finest: dict[int, Outcome] = {}
+    finest: dict[int, RunResult] = {}
     for outcome in result.outcomes:
         setting = outcome.setting
         if setting.model != "hinge-chain" or setting.scheme != "rk4":
@@ -128,8 +128,8 @@ def compute_limit_gap(result: CaseResult) -> float | None:
 
 
 def find_cheapest(
-    outcomes: list[Outcome], model: str, at_error: float, *, planar: bool = False
-) -> Outcome | None:
+    outcomes: list[RunResult], model: str, at_error: float, *, planar: bool = False
+) -> RunResult | None:
     """The cheapest run of a model with at most this error; raw clamps never count."""
     fits = [
         outcome

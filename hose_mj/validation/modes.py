@@ -74,14 +74,14 @@ def compute_critical_twist(
     start = basis.T @ untwisted.stiffness @ basis
     change = (basis.T @ twisted.stiffness @ basis - start) / twist
 
-    def find_lowest(moment: float) -> float:
+    def compute_lowest(moment: float) -> float:
         stiffness = start + moment * change
         return float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[n_neutral])
 
     high = twist
-    while find_lowest(high) > 0.0:
+    while compute_lowest(high) > 0.0:
         high *= 1.3
-    return float(brentq(find_lowest, 0.0, high, xtol=1e-9 * twist))
+    return float(brentq(compute_lowest, 0.0, high, xtol=1e-9 * twist))
 
 
 def turn_about_x(small: Linearization, angle: float) -> Linearization:

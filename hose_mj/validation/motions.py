@@ -1,40 +1,56 @@
-"""The dynamic cases: motions, compared with their converged limit."""
+"""The dynamic cases, compared with their converged limit, and those with contact."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache, partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
+from hose_mj.errors import StepError
+from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.spec import HoseSpec
+from hose_mj.validation import reference
 from hose_mj.validation.case import (
+    DOWN,
     GRAVITY,
     LENGTH,
     ROD,
     Case,
     Motion,
-    find_tip,
+    Reference,
     lay_between,
     lay_cantilever,
+    read_places,
+    read_tip,
 )
+from hose_mj.validation.quasistatic import WIDTH, Chain, settle
+
+ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
+"""Turns a cylinder's axis to y, across the plane in which hoses are laid."""
+
+_MOTION = partial(Case, gravity=DOWN, scale=LENGTH)
+
+
+def _ease(time: float, ramp: float) -> float:
+    """Rises from 0 to 1 within `ramp` (s), at rest before and after: half a cosine."""
+    return 0.5 - 0.5 * math.cos(math.pi * min(time / ramp, 1.0))
 
 
 def make_released_rod() -> Case:
     """A horizontal cantilever let go."""
-    return Case(
+    return _MOTION(
         id="released-rod",
-        family="released-rod",
         title="Released rod: a horizontal cantilever let go",
         about="A straight horizontal cantilever is let go and swings for a second under gravity. "
         "Compared: the place of the tip, largest distance over the second.",
         spec=ROD,
-        gravity=(0.0, 0.0, -GRAVITY),
         lay=lay_cantilever,
-        probe=find_tip,
-        scale=LENGTH,
+        probe=read_tip,
         motion=Motion(1.0, 50),
         clamped=True,
     )
@@ -55,19 +71,14 @@ def make_free_flight() -> Case:
         hose.reset([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]], speed)
         return []
 
-    def probe(hose: HoseModel) -> Array:
-        return np.asarray(hose.position(np.array([0.0, 0.5, 1.0]) * LENGTH).ravel())
-
     return Case(
         id="free-flight",
-        family="free-flight",
         title="Free flight: a straight hose thrown spinning and flexing, without gravity",
         about="A straight hose is thrown at .5 m/s with a spin of 4 rad/s and a smooth flexing "
         "motion on top. Compared: the places of both ends and the middle.",
         spec=ROD,
-        gravity=(0.0, 0.0, 0.0),
         lay=lay,
-        probe=probe,
+        probe=read_places((0.0, 0.5, 1.0)),
         scale=LENGTH,
         motion=Motion(1.0, 50),
     )
@@ -77,27 +88,18 @@ def make_taut_pull() -> Case:
     """A sagging hose drawn taut by its ends."""
     slack, taut, ramp = 0.8 * LENGTH, 0.995 * LENGTH, 0.6
 
-    def lay(hose: HoseModel) -> list[Hold]:
-        return lay_between(hose, slack)
-
     def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
-        along = 0.5 - 0.5 * math.cos(math.pi * min(time / ramp, 1.0))
-        hose.move(holds[1], (slack + (taut - slack) * along, 0.0, 0.0))
+        hose.move(holds[1], (slack + (taut - slack) * _ease(time, ramp), 0.0, 0.0))
 
-    def probe(hose: HoseModel) -> Array:
-        return np.asarray(hose.position(np.array([0.25, 0.5, 0.75]) * LENGTH).ravel())
-
-    return Case(
+    return _MOTION(
         id="taut-pull-hose",
         family="taut-pull",
         title="Taut pull: two ends moved apart until the hose is taut, then held",
         about="A sagging hose is let go between two attachments; one is drawn away from .8 to "
         ".995 L within a second and held for another. Compared: the places of the quarter points.",
         spec=replace(ROD, damping_time=0.01),
-        gravity=(0.0, 0.0, -GRAVITY),
-        lay=lay,
-        probe=probe,
-        scale=LENGTH,
+        lay=lambda hose: lay_between(hose, slack),
+        probe=read_places((0.25, 0.5, 0.75)),
         motion=Motion(1.0, 50, drive),
     )
 
@@ -105,14 +107,6 @@ def make_taut_pull() -> Case:
 def make_suture_pull() -> Case:
     """A suture thread drawn taut sideways."""
     length = 0.1
-    spec = HoseSpec.from_material(
-        length=length,
-        youngs_modulus=750e6,
-        poisson_ratio=0.4,
-        density=1100.0,
-        outer_radius=0.2e-3,
-        damping_time=2e-3,
-    )
     slack, pull, ramp = 0.098, 0.0105, 0.3
     starts: WeakKeyDictionary[HoseModel, Array] = WeakKeyDictionary()
 
@@ -128,12 +122,8 @@ def make_suture_pull() -> Case:
         return [*ends, hose.attach(0.5 * length)]
 
     def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
-        along = 0.5 - 0.5 * math.cos(math.pi * min(time / ramp, 1.0))
         aim = np.array([0.5 * slack, 0.0, pull])
-        hose.move(holds[2], starts[hose] + (aim - starts[hose]) * along)
-
-    def probe(hose: HoseModel) -> Array:
-        return np.asarray(hose.position(np.array([0.25, 0.75]) * length).ravel())
+        hose.move(holds[2], starts[hose] + (aim - starts[hose]) * _ease(time, ramp))
 
     return Case(
         id="taut-pull-suture",
@@ -141,12 +131,223 @@ def make_suture_pull() -> Case:
         title="Taut pull: a suture thread drawn sideways at its middle",
         about="10 cm of thread, radius .2 mm, E = 750 MPa, both ends held 98 mm apart; its middle "
         "is drawn sideways until taut, then held. Compared: the places of the quarter points.",
-        spec=spec,
-        gravity=(0.0, 0.0, -GRAVITY),
+        spec=HoseSpec.from_material(
+            length=length,
+            youngs_modulus=750e6,
+            poisson_ratio=0.4,
+            density=1100.0,
+            outer_radius=0.2e-3,
+            damping_time=2e-3,
+        ),
+        gravity=DOWN,
         lay=lay,
-        probe=probe,
+        probe=read_places((0.25, 0.75), length),
         scale=length,
         motion=Motion(0.5, 25, drive),
         models=("geds",),
         steps=(0.002, 0.001, 0.0005, 0.00025),
+    )
+
+
+def make_capstan() -> Case:
+    """A hose drawn over half a drum."""
+    length, friction, drum, pull = 0.6, 0.3, 0.1, 1.0
+    speed, pause, n_steps = 0.05, 0.005, 300
+    spec = HoseSpec(
+        length=length,
+        axial_stiffness=2e3,
+        bending_stiffness=1e-5,
+        torsional_stiffness=0.0,
+        linear_density=0.1,
+        outer_radius=0.005,
+        damping_time=0.01,
+    )
+    bend = drum + spec.outer_radius
+    leg = 0.5 * (length - math.pi * bend)
+
+    def curve(s: Array) -> Array:
+        angle = np.clip((s - leg) / bend, 0.0, math.pi)
+        down = np.maximum(leg - s, 0.0) + np.maximum(s - length + leg, 0.0)
+        return np.stack([-bend * np.cos(angle), 0.0 * s, bend * np.sin(angle) - down], axis=1)
+
+    def lay(hose: HoseModel) -> list[Hold]:
+        hose.reset(curve)
+        return []
+
+    def probe(hose: HoseModel) -> Array:
+        hose.apply_force(0.0, (0.0, 0.0, -pull))
+        hold, place, pulls = hose.attach(length), hose.position(length)[0], []
+        for _ in range(n_steps):
+            place = place - [0.0, 0.0, speed * pause]
+            hose.move(hold, place)
+            hose.step(max(1, round(pause / hose.timestep)))
+            pulls.append(-hose.reaction(hold).force[2])
+        return np.array([np.mean(pulls[n_steps // 2 :]) / pull])
+
+    return Case(
+        id="capstan",
+        title="Capstan: a hose drawn over half a drum",
+        about="A weightless hose lies over half a drum; one end is pulled with 1 N, the other "
+        "drawn away at 5 cm/s. Compared: the ratio of the two pulls, mean of the second half of "
+        "1.5 s, with Euler's and Eytelwein's exp(mu theta), mu = .3, theta = pi.",
+        spec=spec,
+        lay=lay,
+        probe=probe,
+        truth=lambda: np.array([reference.capstan(friction, math.pi)]),
+        models=("geds",),
+        obstacles=(
+            Obstacle(kind="cylinder", rotation=ACROSS, size=(drum, 0.2), friction=friction),
+        ),
+        contact_law=ContactLaw(stiffness=1e5),
+        promised={20: 0.01},
+    )
+
+
+TOW_TIME = 72.0
+TOW_SAMPLES = 24
+TOW_FRICTION = 0.5
+_TOW_WIDTH = 0.35
+_TOWED = HoseSpec(
+    length=LENGTH,
+    axial_stiffness=2e3,
+    bending_stiffness=5e-3,
+    torsional_stiffness=5e-3 / 1.3,
+    linear_density=0.1,
+    damping_time=0.01,
+)
+
+
+@cache
+def _make_eight() -> CubicSpline:
+    """The figure of eight over the fraction of its length, starting at the far end of the hose."""
+    turn = np.linspace(0.0, 2.0 * math.pi, 4001)
+    eight = np.stack([np.sin(turn), 0.5 * np.sin(2.0 * turn)], axis=1) * _TOW_WIDTH
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(eight, axis=0), axis=1))])
+    return CubicSpline(along / along[-1], eight + np.array([LENGTH, 0.0]))
+
+
+def compute_tow_place(fraction: Array) -> Array:
+    """Places (k, 2) of the towed end after fractions (k,) of a figure of eight, even in speed."""
+    return np.asarray(_make_eight()(fraction))
+
+
+def tow_chain(
+    spec: HoseSpec,
+    friction: float,
+    start: Array,
+    path: Array,
+    delta: float,
+    gravity: float = GRAVITY,
+) -> Array:
+    """Tows a chain by its last node.
+
+    Args:
+        spec: the hose; stretching, bending and weight count.
+        friction: Coulomb's coefficient of the floor.
+        start: nodes (N + 1, 2) of the chain at rest, evenly spaced along it, m.
+        path: places of the last node, one an increment, (k, 2), m.
+        delta: slip below which friction is smoothed (m), well below an increment.
+        gravity: m/s^2.
+
+    Returns:
+        nodes after each increment, (k, N + 1, 2), m.
+
+    Raises:
+        StepError: an increment that does not converge.
+    """
+    n = len(start)
+    h = spec.length / (n - 1)
+    drag = friction * spec.linear_density * gravity
+    chain = Chain(h, spec.axial_stiffness, spec.bending_stiffness, drag, delta, 1e-3 * delta)
+    x = np.array(start, dtype=np.float64).ravel()
+    padded = 2 * n + WIDTH
+    work = np.zeros(padded), np.zeros((padded, 2 * WIDTH)), np.zeros((1, padded)), np.zeros(2 * n)
+    shapes = np.empty((len(path), n, 2))
+    for k, place in enumerate(path):
+        before = x.copy()
+        x[-2:] = place
+        if not settle(x, before, chain, *work):
+            raise StepError(f"increment {k} of the tow did not converge")
+        shapes[k] = x.reshape(n, 2)
+    return shapes
+
+
+def _tow_chain(n_links: int, n_increments: int) -> Array:
+    """Computes with the minimiser what `make_floor_tow` compares: (TOW_SAMPLES + 1, 33), m."""
+    start = np.stack([np.linspace(0.0, LENGTH, n_links + 1), np.zeros(n_links + 1)], axis=1)
+    path = compute_tow_place(np.arange(1, n_increments + 1) / n_increments)
+    slip = 2e-3 * float(np.linalg.norm(path[1] - path[0]))
+    shapes = tow_chain(_TOWED, TOW_FRICTION, start, path, slip)
+    every = n_increments // TOW_SAMPLES
+    seen = np.concatenate([start[None], shapes[every - 1 :: every]])[:, :: n_links // 10]
+    heights = np.full((*seen.shape[:2], 1), _TOWED.outer_radius)
+    return np.concatenate([seen, heights], axis=2).reshape(len(seen), -1)
+
+
+@cache
+def compute_tow() -> Reference:
+    """The minimiser's answer, and how far it is from that of half as many links and increments."""
+    coarse, fine = (_tow_chain(200 * k, 80 * k * TOW_SAMPLES) for k in (1, 2))
+    gap = (fine - coarse).reshape(len(fine), -1, 3)
+    return Reference(fine, float(np.max(np.linalg.norm(gap, axis=2))) / LENGTH)
+
+
+def make_floor_tow() -> Case:
+    """A hose towed slowly along a figure of eight on a rough floor."""
+    height = _TOWED.outer_radius * (1.0 - SINK)
+
+    def lay(hose: HoseModel) -> list[Hold]:
+        hose.reset([[0.0, 0.0, height], [LENGTH, 0.0, height]])
+        return [hose.attach(LENGTH, (LENGTH, 0.0, height))]
+
+    def drive(hose: HoseModel, holds: list[Hold], time: float) -> None:
+        hose.move(holds[0], (*compute_tow_place(np.array(time / TOW_TIME)), height))
+
+    return _MOTION(
+        id="floor-tow",
+        title="Floor tow: a hose towed slowly along a figure of eight",
+        about="A hose on a rough floor, mu = .5, is towed by one end along a figure of eight, 3 "
+        "cm/s. Compared: the places of eleven points, with a chain that minimises its energy and "
+        "the work of friction increment by increment. The segments of MuJoCo's cable are round "
+        "and roll sideways over the floor; that gap stays whatever their number.",
+        spec=_TOWED,
+        lay=lay,
+        probe=read_places(np.linspace(0.0, 1.0, 11)),
+        motion=Motion(TOW_TIME, TOW_SAMPLES, drive),
+        models=("geds", "cable"),
+        steps=(0.1, 0.05),
+        obstacles=(Obstacle(kind="plane", friction=TOW_FRICTION),),
+        contact_law=ContactLaw(slip_speed=3e-5),
+        planar=False,
+        reference=compute_tow,
+        uncertainty=2e-3,
+        promise=5e-3,
+        has_ratios=False,
+    )
+
+
+def make_obstacle_drop() -> Case:
+    """A cantilever let go above a bar."""
+    bar = Obstacle(
+        kind="cylinder", position=(0.5, 0.0, -0.3), rotation=ACROSS, size=(0.1, 0.2), friction=0.3
+    )
+    return _MOTION(
+        id="obstacle-drop",
+        title="Obstacle drop: a horizontal cantilever let go above a bar",
+        about="A straight horizontal cantilever is let go, falls onto a round bar, mu = .3, and "
+        "whips around it. Compared: the places of the middle, three quarters and the tip. GEDS "
+        "converges to its own contact law; MuJoCo's soft contacts are another.",
+        spec=replace(
+            ROD, bending_stiffness=0.02, torsional_stiffness=0.02 / 1.3, damping_time=0.02
+        ),
+        lay=lay_cantilever,
+        probe=read_places((0.5, 0.75, 1.0)),
+        motion=Motion(1.0, 50),
+        clamped=True,
+        models=("geds", "cable"),
+        obstacles=(bar,),
+        contact_law=ContactLaw(stiffness=3e3, width=1e-3),
+        uncertainty=5e-4,
+        promise=5e-3,
+        has_ratios=False,
     )

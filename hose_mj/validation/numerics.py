@@ -1,21 +1,24 @@
-"""What GEDS promises of its own numerics, measured: orders, conserved quantities, cost.
+"""What GEDS promises of its own numerics, measured: orders, conserved quantities, twist, cost.
 
 Each function returns checks; together they are the part of `hose-mj compare` that needs no peer.
+One more measures the softness that is left in the edges of MuJoCo's flex rod.
 """
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from hose_mj.checks import Check
 from hose_mj.hoses.geds.hose import GedsHose
-from hose_mj.hoses.protocol import Array
+from hose_mj.hoses.mujoco.flex import FlexHose
+from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.validation import reference
-from hose_mj.validation.case import ROD, Case
+from hose_mj.validation.case import LENGTH, ROD, STOUT, Case, lay_straight
 from hose_mj.validation.cases import find_cases
 from hose_mj.validation.modes import compute_frequencies
 from hose_mj.validation.run import simulate
@@ -23,6 +26,16 @@ from hose_mj.validation.settings import Setting
 
 Curves = dict[str, tuple[list[float], list[float]]]
 """Label -> (x, error) of a convergence plot."""
+Kind = tuple[str | None, int]
+"""A plane or a form of twist, and control points: what steps are timed by."""
+FORMS = ("scalar", "theta")
+"""The two ways in which GEDS carries twist."""
+FLEX_CASE = "released-rod"
+FLEX_SEGMENTS = 20
+FLEX_STEPS = (0.004, 0.002, 0.001)
+"""Time steps (s) of the flex rod; its default edges have a time constant of two steps."""
+_SETTLING = 20
+"""Turns after which a precessing rod has settled."""
 
 
 def measure_order(sizes: list[float], errors: list[float]) -> float:
@@ -92,14 +105,10 @@ def check_time_order() -> tuple[list[Check], Curves]:
 
     limit = (4.0 * move("sdirk2", steps[-1] / 16) - move("sdirk2", steps[-1] / 8)) / 3.0
     checks, curves = [], {}
-    for scheme, least in (
-        ("bdf2", 1.9),
-        ("sdirk2", 1.9),
-        ("midpoint", 1.9),
-        ("backward-euler", 0.9),
-    ):
+    for scheme in ("bdf2", "sdirk2", "midpoint", "backward-euler"):
         errors = [float(np.max(np.abs(move(scheme, step) - limit))) for step in steps]
         order = measure_order(steps, errors)
+        least = 0.9 if scheme == "backward-euler" else 1.9
         checks.append(Check(f"order of convergence in the time step, {scheme}", order, least, ">="))
         curves[scheme] = (steps, errors)
     return checks, curves
@@ -163,23 +172,31 @@ def check_energy() -> tuple[list[Check], tuple[list[float], list[float]]]:
 def check_cost() -> tuple[list[Check], Curves]:
     """Cost of a step over the number of control points, in a plane and in space."""
     points = (16, 32, 64, 128, 256)
-    hoses = {(plane, n): _make_swinging(plane, n) for plane in (None, "xz") for n in points}
-    least = {key: np.inf for key in hoses}
-    for _ in range(7):
+    sizes = [float(n) for n in points]
+    least = _time_steps(
+        {(plane, n): _make_swinging(plane, n) for plane in (None, "xz") for n in points}, rounds=7
+    )
+    checks: list[Check] = []
+    curves: Curves = {}
+    for plane, name in ((None, "in space"), ("xz", "in a plane")):
+        walls = [least[plane, n] for n in points]
+        exponent = measure_order(sizes, walls)
+        checks.append(Check(f"exponent of the cost in control points, {name}", exponent, 1.1))
+        curves[f"geds {name}"] = (sizes, walls)
+    ratio = least["xz", 16] / least[None, 16]
+    checks.append(Check("cost of a planar step over a spatial one, 16 control points", ratio, 0.75))
+    return checks, curves
+
+
+def _time_steps(hoses: Mapping[Kind, GedsHose], rounds: int) -> dict[Kind, float]:
+    """The least thread time of a step of each hose (s), over rounds of 100 steps, all in turn."""
+    least = dict.fromkeys(hoses, math.inf)
+    for _ in range(rounds):
         for key, hose in hoses.items():
             start = time.thread_time()
             hose.step(100)
             least[key] = min(least[key], (time.thread_time() - start) / 100)
-    checks: list[Check] = []
-    curves: Curves = {}
-    for plane, name in ((None, "in space"), ("xz", "in a plane")):
-        walls = [float(least[plane, n]) for n in points]
-        exponent = measure_order([float(n) for n in points], walls)
-        checks.append(Check(f"exponent of the cost in control points, {name}", exponent, 1.1))
-        curves[f"geds {name}"] = ([float(n) for n in points], walls)
-    ratio = float(least["xz", 16] / least[None, 16])
-    checks.append(Check("cost of a planar step over a spatial one, 16 control points", ratio, 0.75))
-    return checks, curves
+    return least
 
 
 def _make_swinging(plane: str | None, n: int) -> GedsHose:
@@ -225,3 +242,178 @@ def check_random_states(
         Check("random states that end in a verdict", tally.verdicts / n_states, 0.01, "<"),
         Check("random states whose verdict changed the state", float(tally.touched), 0.0),
     ]
+
+
+def check_turns() -> list[Check]:
+    """27 turns, 40 degrees a step, on a straight rod under tension."""
+    checks = []
+    for form in FORMS:
+        hose = GedsHose(STOUT, timestep=0.005, gravity=(0, 0, 0), control_points=16, twist=form)
+        lay_straight(hose)
+        hose.clamp(0.0)
+        # Tight enough to stay straight: T above M^2 / (4 EI).
+        moment = 54.0 * math.pi * STOUT.torsional_stiffness / LENGTH
+        strain = moment**2 / STOUT.bending_stiffness / STOUT.axial_stiffness
+        far = hose.clamp(LENGTH, (LENGTH * (1.0 + strain), 0.0, 0.0), (1.0, 0.0, 0.0))
+        hose.solve_static()
+        for _ in range(27 * 9):
+            hose.move(far, spin=2.0 * math.pi / 9)
+            hose.step()
+        hose.step(400)
+        error = abs(float(hose.torque(0.5 * LENGTH)[0]) / moment - 1.0)
+        checks.append(
+            Check(f"27 turns, 40 degrees a step, {form}: error of the torque", error, 1e-9)
+        )
+    return checks
+
+
+def _turn_about_x(vector: Array, angle: float) -> Array:
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y, z = vector
+    return np.array([x, cosine * y - sine * z, sine * y + cosine * z])
+
+
+def _compute_spin(tangent: Array, director: Array, angle: float) -> tuple[Array, Array, float]:
+    """Tangent and director turned about x, and their spin beyond the smallest rotation."""
+    ahead, wanted = _turn_about_x(tangent, angle), _turn_about_x(director, angle)
+    factor = (director @ ahead) / (1.0 + tangent @ ahead)
+    carried = director - factor * (tangent + ahead)
+    spin = math.atan2(float(np.cross(carried, wanted) @ ahead), float(carried @ wanted))
+    return ahead, wanted, spin
+
+
+def precess(form: str, n_turns: int, steps_a_turn: int = 36) -> Iterator[GedsHose]:
+    """Turns a bent, twisted rod about the axis of its first clamp as if it were rigid.
+
+    Yields the hose at equilibrium before it begins, then after every turn.
+    """
+    spec = replace(ROD, damping_time=0.1)
+    hose = GedsHose(
+        spec, timestep=0.02, gravity=(0, 0, 0), control_points=16, twist=form, tolerance=1e-9
+    )
+    bend = 1.2
+    hose.reset(
+        lambda s: np.stack([np.sin(bend * s) / bend, (1 - np.cos(bend * s)) / bend, 0 * s], axis=1)
+    )
+    holds: list[Hold] = [hose.clamp(0.0), hose.clamp(LENGTH)]
+    hose.move(holds[1], spin=1.0)
+    hose.solve_static()
+    yield hose
+    place, tangent = hose.position(LENGTH)[0], hose.tangent(LENGTH)[0]
+    director = np.cross(tangent, [0.0, 0.0, 1.0])
+    angle = 2.0 * math.pi / steps_a_turn
+    for _ in range(n_turns):
+        for _ in range(steps_a_turn):
+            place = _turn_about_x(place, angle)
+            tangent, director, spin = _compute_spin(tangent, director, angle)
+            hose.move(holds[0], spin=angle)
+            hose.move(holds[1], position=place, tangent=tangent, spin=spin)
+            hose.step()
+        yield hose
+
+
+def check_precession() -> list[Check]:
+    """A bent rod with twist precesses 100 turns: its twist must be what it was."""
+    places = np.linspace(0.1, 0.9, 9) * LENGTH
+    checks = []
+    for form in FORMS:
+        states = precess(form, _SETTLING + 100)
+        scale = float(np.mean(np.abs(next(states).twist(places))))
+        # The first turns set it moving; what is then must stay.
+        twists = [hose.twist(places) for hose in states]
+        settled, end = twists[_SETTLING - 1], twists[-1]
+        name = f"precessing bent rod, {form}: drift of the twist over 100 turns"
+        checks.append(Check(name, float(np.max(np.abs(end - settled))) / scale, 1e-6))
+    return checks
+
+
+def check_agreement() -> list[Check]:
+    """Both forms on the localized helix with 100 control points, and on the largest ring."""
+    checks = []
+    for name, n, limit in (("helix", 100, 3e-3), ("ring-twist-1", 24, 3e-3)):
+        case = _find(name)
+        found = []
+        for form in FORMS:
+            hose = Setting("geds", "statics", n).make(case, twist=form)
+            case.lay(hose)
+            found.append(case.probe(hose))
+        gap = float(np.max(np.abs(found[1] / found[0] - 1.0)))
+        text = f"{name} with {n} control points: theta differs from scalar twist by"
+        checks.append(Check(text, gap, limit))
+    return checks
+
+
+def check_twist_cost() -> tuple[list[Check], Curves]:
+    """A step with twist over the plain one, between two clamps, one Newton iteration each."""
+    points = (16, 32, 64, 128)
+    sizes = [float(n) for n in points]
+    names = {"plain": "without twist", "scalar": "scalar twist", "theta": "theta"}
+    least = _time_steps(
+        {(form, n): _make_twisted(form, n) for form in names for n in points}, rounds=15
+    )
+    curves: Curves = {
+        name: (sizes, [least[form, n] for n in points]) for form, name in names.items()
+    }
+    checks: list[Check] = []
+    for form, limit in (("scalar", 1.4), ("theta", 2.0)):
+        ratio = max(least[form, n] / least["plain", n] for n in points)
+        name = f"cost of a step with {form} twist over one without, 16 to 128 control points"
+        checks.append(Check(name, ratio, limit))
+        exponent = measure_order(*curves[names[form]])
+        checks.append(Check(f"exponent of the cost in control points, {form} twist", exponent, 1.1))
+    return checks, curves
+
+
+def _make_twisted(form: str, n: int) -> GedsHose:
+    """A straight rod under tension between two clamps, with some twist."""
+    spec = replace(ROD, torsional_stiffness=0.0) if form == "plain" else ROD
+    twist = None if form == "plain" else form
+    hose = GedsHose(spec, timestep=2e-4, control_points=n, twist=twist)
+    hose.clamp(0.0)
+    far = hose.clamp(LENGTH)
+    if form != "plain":
+        hose.move(far, spin=1.0)
+    hose.step(100)
+    return hose
+
+
+def measure_stretch(case: Case, timestep: float) -> float:
+    """Largest strain of any edge at the sampled instants of a motion, either sign."""
+    corrected = True if case.clamped else None
+    hose = Setting("flex", "discrete", FLEX_SEGMENTS, corrected, timestep).make(case)
+    assert isinstance(hose, FlexHose)
+    strains: list[float] = []
+
+    def probe(moving: object) -> np.ndarray:
+        strains.append(float(np.abs(hose.stretch()).max()))
+        return np.zeros(3)
+
+    simulate(replace(case, probe=probe), hose)
+    return max(strains)
+
+
+def check_flex_stretch() -> list[Check]:
+    """Stretch of the released rod's edges, and how it falls with the time step."""
+    case = _find(FLEX_CASE)
+    stretches = [measure_stretch(case, step) for step in FLEX_STEPS]
+    order = measure_order(list(FLEX_STEPS), stretches)
+    name = f"flex, {FLEX_SEGMENTS} segments: residual stretch of the released rod"
+    return [
+        Check(f"{name} at {1e3 * FLEX_STEPS[-1]:g} ms", stretches[-1], 1e-3),
+        Check(f"{name}, order in the time step", order, 1.8, ">="),
+    ]
+
+
+CURVES: dict[str, Callable[[], tuple[list[Check], Curves]]] = {
+    "Error of the frequencies over the span length": check_frequency_order,
+    "Error of the swing over the span length": check_swing_order,
+    "Error over the time step": check_time_order,
+    "Wall time of a step over the control points": check_cost,
+    "Wall time of a step with twist": check_twist_cost,
+}
+"""Measurements that make a convergence plot, by its title."""
+CHECKS: dict[str, tuple[Callable[[], list[Check]], ...]] = {
+    "twist": (check_turns, check_precession, check_agreement),
+    "suture thread": (check_suture,),
+}
+"""Other measurements, by what they are about."""

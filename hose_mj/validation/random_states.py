@@ -19,7 +19,7 @@ N_STEPS = 3
 
 @dataclass
 class Tally:
-    """How many random states ended how.
+    """Counts of the ways in which random states ended.
 
     Attributes:
         not_finite: a position or velocity that is not finite.

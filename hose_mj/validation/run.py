@@ -30,14 +30,14 @@ N_CONTENDERS = 2
 REFERENCE_POINTS = 48
 """Control points of the references of the cases."""
 BUDGET_SPENT = "the budget was spent"
-"""Why a run did not start any more."""
+"""The reason of a run that did not start any more."""
 N_DRAWN, N_DRAWN_IN_SPACE = 41, 601
 """Points along the hose that are kept for pictures; a coil needs more."""
 
 
 @dataclass
-class Outcome:
-    """What one setting reached in one case.
+class RunResult:
+    """The result of one setting in one case.
 
     Attributes:
         case: its id.
@@ -100,9 +100,9 @@ class Skipped:
 
 def run_static(
     case: Case, models: tuple[str, ...], grid: Grid
-) -> tuple[list[Outcome], list[Skipped]]:
+) -> tuple[list[RunResult], list[Skipped]]:
     """Runs a static case with every setting of the grid; skips where no equilibrium was found."""
-    outcomes: list[Outcome] = []
+    outcomes: list[RunResult] = []
     skipped: list[Skipped] = []
     for setting in list_static(case, models, grid):
         try:
@@ -112,7 +112,7 @@ def run_static(
     return outcomes, skipped
 
 
-def score_static(case: Case, setting: Setting, reference: Reference | None = None) -> Outcome:
+def score_static(case: Case, setting: Setting, reference: Reference | None = None) -> RunResult:
     """One equilibrium, against its closed form or, where that is given, a converged reference.
 
     Raises:
@@ -130,7 +130,7 @@ def score_static(case: Case, setting: Setting, reference: Reference | None = Non
     else:
         assert case.scale is not None
         error = compute_distance(values[None], reference.values) / case.scale
-    return Outcome(
+    return RunResult(
         case.id,
         setting,
         error,
@@ -212,12 +212,12 @@ def run_ladder(
     reference: Reference,
     grid: Grid,
     until: float = math.inf,
-) -> tuple[list[Outcome], list[Skipped]]:
+) -> tuple[list[RunResult], list[Skipped]]:
     """Runs one model and resolution down its time steps, from the largest stable one on.
 
     No run starts after `until`, a reading of `time.perf_counter`.
     """
-    outcomes: list[Outcome] = []
+    outcomes: list[RunResult] = []
     skipped: list[Skipped] = []
     for setting in ladder:
         if setting.model != "geds" and outcomes:
@@ -247,12 +247,12 @@ def run_ladder(
     return outcomes, skipped
 
 
-def _is_exhausted(outcomes: list[Outcome]) -> bool:
+def _is_exhausted(outcomes: list[RunResult]) -> bool:
     """True once the last halving of the time step took less than STAGNATION off the error."""
     return len(outcomes) >= 2 and outcomes[-1].error > (1.0 - STAGNATION) * outcomes[-2].error
 
 
-def _score(case: Case, setting: Setting, reference: Reference) -> Outcome | None:
+def _score(case: Case, setting: Setting, reference: Reference) -> RunResult | None:
     """One run against the reference; None where it was unstable."""
     assert case.motion is not None
     assert case.scale is not None
@@ -265,7 +265,7 @@ def _score(case: Case, setting: Setting, reference: Reference) -> Outcome | None
     may_be_far = setting.model == "geds" or not case.has_ratios
     if not (error < LOST or (may_be_far and np.isfinite(error))):
         return None
-    return Outcome(
+    return RunResult(
         case.id,
         setting,
         error,
@@ -296,7 +296,7 @@ def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:
 
 def time_rounds(
     case: Case,
-    outcomes: list[Outcome],
+    outcomes: list[RunResult],
     grid: Grid,
     levels: Sequence[float] = EQUAL_ERRORS,
     until: float = math.inf,
@@ -309,7 +309,7 @@ def time_rounds(
         outcome
         for kind in dict.fromkeys(map(_kind, outcomes))
         for at_error in levels
-        for outcome in _find_fastest(outcomes, kind, at_error)
+        for outcome in _choose_fastest(outcomes, kind, at_error)
     ]
     contenders = list({id(outcome): outcome for outcome in contenders}.values())
     for _ in range(grid.rounds):
@@ -318,15 +318,15 @@ def time_rounds(
                 outcome.wall_s = min(outcome.wall_s, time_run(case, outcome.setting.make(case)))
 
 
-def _find_fastest(
-    outcomes: list[Outcome], kind: tuple[str, bool, bool], at_error: float
-) -> list[Outcome]:
+def _choose_fastest(
+    outcomes: list[RunResult], kind: tuple[str, bool, bool], at_error: float
+) -> list[RunResult]:
     """The few fastest of one kind with at most this error, as first timed."""
     fits = [o for o in outcomes if _kind(o) == kind and o.error <= at_error]
     return sorted(fits, key=lambda outcome: outcome.wall_s)[:N_CONTENDERS]
 
 
-def _kind(outcome: Outcome) -> tuple[str, bool, bool]:
+def _kind(outcome: RunResult) -> tuple[str, bool, bool]:
     setting = outcome.setting
     return setting.model, setting.planar, setting.clamp_corrected is False
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
 
 from hose_mj.hoses.protocol import HoseModel
@@ -24,9 +25,14 @@ STAGNATION = 0.15
 this fraction off its error."""
 
 
+def has_cable() -> bool:
+    """Says whether this MuJoCo has the composite cable: versions from 4 on have none."""
+    return int(version("mujoco").partition(".")[0]) < 4
+
+
 @dataclass(frozen=True)
 class Setting:
-    """How a model is run.
+    """The numbers and the scheme with which a model is run.
 
     Attributes:
         model: id in `hoses.registry.MODELS`.
@@ -44,7 +50,7 @@ class Setting:
 
     @property
     def planar(self) -> bool:
-        """Whether a GEDS hose moves in a plane; the hinge chain always does, other peers never."""
+        """Says whether GEDS moves in a plane; the hinge chain always does, other peers never."""
         return self.scheme.endswith(", planar")
 
     @property
@@ -204,10 +210,10 @@ def _clamps(model: str, case: Case) -> tuple[bool | None, ...]:
 
 
 def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> list[float]:
-    """From LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves of each are among them.
+    """Lists steps from LARGEST_STEP down, each 1.2 to 1.5 times smaller; all halves among them.
 
     An undamped chain with explicit forces need not be tried above twice its limit, known from the
-    highest frequency of a chain of rigid links (docs/mujoco_cable.md): `find_largest_step`.
+    highest frequency of a chain of rigid links (docs/mujoco_cable.md): `compute_largest_step`.
     """
     if model == "geds":
         return [step for step in case.steps if step >= grid.smallest_geds_step]
@@ -215,11 +221,11 @@ def _steps(model: str, scheme: str, resolution: int, case: Case, grid: Grid) -> 
     while STEP_UNIT / parts[-1] > SMALLEST_STEP:
         parts.append(2 * parts[-3])
     steps = [STEP_UNIT / part for part in parts]
-    return [step for step in steps if step < find_largest_step(scheme, resolution, case)]
+    return [step for step in steps if step < compute_largest_step(scheme, resolution, case)]
 
 
-def find_largest_step(scheme: str, resolution: int, case: Case) -> float:
-    """Above this time step an undamped chain with explicit forces is surely unstable (s)."""
+def compute_largest_step(scheme: str, resolution: int, case: Case) -> float:
+    """Returns the step (s) above which an undamped chain with explicit forces is unstable."""
     spec = case.spec
     if scheme == "discrete" or spec.damping_time > 0.0:
         return math.inf

@@ -10,16 +10,19 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
+from hose_mj import extras
+from hose_mj.assets import find_asset
 from hose_mj.checks import Check
 from hose_mj.cli import main as cli
 from hose_mj.cli.compare import MODELS, Args, check_arguments
 from hose_mj.recording.document import make_document
+from hose_mj.validation import settings
 from hose_mj.validation import study as compare_study
 from hose_mj.validation.case import Reference
 from hose_mj.validation.cases import CASES, find_cases
 from hose_mj.validation.compare import CaseResult
-from hose_mj.validation.report.output import write_all
-from hose_mj.validation.run import Outcome
+from hose_mj.validation.report.page import write_all
+from hose_mj.validation.run import RunResult
 from hose_mj.validation.settings import Setting
 
 RECORD = {
@@ -30,6 +33,7 @@ RATIO = {
     *("case", "at_error", "model", "against", "planar", "wall_ratio"),
     *("model_setting", "against_setting"),
 }
+MARKS = (None, f"MuJoCo {json.loads(find_asset('compare/cable.json').read_text())['mujoco']}")
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -188,6 +192,50 @@ def test_only_the_cases_that_a_chosen_model_runs(tmp_path):
     assert check_arguments(every) == CASES
 
 
+@pytest.fixture
+def mujoco_4(monkeypatch):
+    """A MuJoCo without the composite cable."""
+    monkeypatch.setattr(settings, "version", lambda package: "4.0.0")
+
+
+def test_without_the_cable_its_committed_runs_stand_beside_the_rest(capsys, tmp_path, mujoco_4):
+    words = ("--cases", "tip-load-1", "--out", tmp_path)
+    status, printed, _ = run(capsys, *words, "--json")
+    assert status == 0
+    document = json.loads(printed)
+    records = {mark: [r for r in document["records"] if r["committed"] == mark] for mark in MARKS}
+    assert {record["model"] for record in records[None]} == {"geds", "flex", "hinge-chain"}
+    committed = records[MARKS[1]]
+    assert {record["model"] for record in committed} == {"cable"}
+    assert len(records[None]) + len(committed) == len(document["records"])
+    assert document["ratios"] == []
+    check_records([{k: r[k] for k in RECORD} for r in document["records"]])
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "MuJoCo&#x27;s cable, as committed" in page or "MuJoCo's cable, as committed" in page
+
+
+def test_the_cable_where_there_is_none_is_one_line(capsys, tmp_path, mujoco_4):
+    status, printed, said = run(capsys, "--cases", "tip-load-1", "--models", "cable")
+    assert (status, printed) == (2, "")
+    assert said.startswith("hose-mj: error: model is 'cable'; valid: geds, flex, hinge-chain with")
+    assert said.count("\n") == 1
+
+
+def test_without_the_extras_of_the_report_json_alone_runs(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(extras, "find_missing", lambda extra: ["matplotlib"])
+    monkeypatch.chdir(tmp_path)
+    words = ("--cases", "tip-load-1", "--models", "geds")
+    status, printed, said = run(capsys, *words)
+    assert (status, printed) == (2, "")
+    assert "pip install 'hose-mj[report]'" in said
+    assert said.count("\n") == 1
+    status, printed, said = run(capsys, *words, "--json")
+    assert status == 0
+    assert json.loads(printed)["records"]
+    assert "report: none" in said
+    assert list(tmp_path.iterdir()) == []
+
+
 def make_motion(models):
     """A study of one motion with made-up runs of these models."""
     (case,) = find_cases(("released-rod",))
@@ -195,7 +243,7 @@ def make_motion(models):
     still = np.linspace([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 41)
     points = np.tile(still, (51, 1, 1))
     outcomes = [
-        Outcome(
+        RunResult(
             *(case.id, Setting(model, scheme, n, clamp, step), error, "converged", wall, 1.0, 0),
             *(times, points + np.array([0.0, 0.0, error]), np.tile([1.0, 0.0, error], (51, 1))),
         )

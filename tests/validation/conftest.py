@@ -9,7 +9,7 @@ from hose_mj.errors import StepError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation import settings
 from hose_mj.validation.case import Case, Motion
-from hose_mj.validation.run import Outcome
+from hose_mj.validation.run import RunResult
 from hose_mj.validation.settings import Setting
 
 SPEC = HoseSpec(
@@ -93,7 +93,7 @@ def make_outcome():
         assert not options
         setting = Setting(model, scheme, n, clamp, timestep)
         times, points = np.array([0.0, 1.0]), np.zeros((2, 41, 3))
-        return Outcome(
+        return RunResult(
             "fake", setting, error, "converged", wall, 1.0, 0, times, points, np.asarray(values)
         )
 

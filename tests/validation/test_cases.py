@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from importlib.metadata import EntryPoint
+
 import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.registry import MODELS
+from hose_mj.validation import cases
 from hose_mj.validation.cases import CASES, find_cases
 from hose_mj.validation.compare import INEXTENSIBLE
 from hose_mj.validation.run import simulate
@@ -257,3 +260,57 @@ def test_an_unknown_case_is_answered_with_the_families(unknown):
     assert message.startswith(f"case is {unknown!r}; valid: ")
     for case in CASES:
         assert case.family in message
+
+
+PLUGIN = """
+from dataclasses import replace
+from hose_mj.validation.statics import make_tip_load
+
+ONE = replace(make_tip_load(3.0), id="my-load")
+
+def list_some():
+    return [replace(ONE, id="my-first", family="mine"), replace(ONE, id="my-second", family="mine")]
+
+def list_nonsense():
+    return [ONE, "no case"]
+"""
+
+
+@pytest.fixture
+def plug_in(tmp_path, monkeypatch):
+    """Lets other packages name these things of a module in `hose_mj.cases`."""
+    (tmp_path / "my_plugin.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def plug(*names):
+        found = {n: EntryPoint(n, f"my_plugin:{n}", "hose_mj.cases") for n in names}
+        monkeypatch.setattr(cases, "find_plugins", lambda group: found)
+        cases.list_plugin_cases.cache_clear()
+
+    yield plug
+    cases.list_plugin_cases.cache_clear()
+
+
+def test_cases_of_other_packages_are_found_by_id_and_family(plug_in):
+    plug_in("ONE", "list_some")
+    assert [case.id for case in find_cases(("my-load",))] == ["my-load"]
+    assert [case.id for case in find_cases(("mine", "tip-load-1"))] == [
+        *("tip-load-1", "my-first", "my-second"),
+    ]
+    assert find_cases(()) == CASES
+    with pytest.raises(InputError, match="mine"):
+        find_cases(("nonsense",))
+
+
+@pytest.mark.parametrize(("names", "what"), [(["list_nonsense"], "Case"), (["missing"], "missing")])
+def test_a_plugin_that_is_no_case_is_one_error(plug_in, names, what):
+    plug_in(*names)
+    with pytest.raises(InputError, match=what):
+        find_cases(("my-load",))
+
+
+def test_an_id_that_is_taken(plug_in):
+    plug_in("ONE", "list_some")
+    cases.find_plugins(None)["again"] = EntryPoint("again", "my_plugin:ONE", "hose_mj.cases")
+    with pytest.raises(InputError, match="my-load"):
+        find_cases(("mine",))

@@ -3,7 +3,7 @@
 import pytest
 
 from hose_mj.validation.cases import find_cases
-from hose_mj.validation.flex_checks import check_flex_stretch, measure_stretch
+from hose_mj.validation.numerics import check_flex_stretch, measure_stretch
 
 
 def test_the_released_rods_edges_give_little_and_less_with_smaller_steps():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.validation.contacts import TOW_SAMPLES, compute_tow, find_tow
-from hose_mj.validation.quasistatic import tow_chain
+from hose_mj.validation.motions import TOW_SAMPLES, compute_tow, compute_tow_place, tow_chain
 
 SPEC = HoseSpec(
     length=1.0,
@@ -79,7 +78,7 @@ def test_a_stiff_chain_turns_about_a_point_inside():
 
 
 def test_the_figure_of_eight_is_even_closed_and_crosses_itself():
-    places = find_tow(np.linspace(0.0, 1.0, 201))
+    places = compute_tow_place(np.linspace(0.0, 1.0, 201))
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     np.testing.assert_allclose(steps, steps.mean(), rtol=0.02)
     np.testing.assert_allclose(places[[0, 100, 200]], [[1.0, 0.0]] * 3, atol=1e-9)

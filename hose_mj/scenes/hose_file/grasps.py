@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.toml_table import Table
+from hose_mj.toml_table import TomlTable
 
 Vector = tuple[float, float, float]
 PROFILES = ("smooth", "linear")
@@ -39,7 +39,7 @@ class Timed:
         return self.start + self.duration
 
     def progress(self, time: float) -> float:
-        """How much of it is done at a time: 0 before, 1 after."""
+        """Returns the share of it that is done at a time: 0 before, 1 after."""
         share = min(max((time - self.start) / self.duration, 0.0), 1.0)
         return share if self.profile == "linear" else 0.5 - 0.5 * math.cos(math.pi * share)
 
@@ -66,7 +66,7 @@ class Spin(Timed):
 
 
 @dataclass(frozen=True)
-class HeldPlace:
+class Grasp:
     """One hold.
 
     Attributes:
@@ -92,7 +92,7 @@ class HeldPlace:
         return (*self.moves, *self.spins)
 
     def position_at(self, time: float) -> Vector:
-        """Where it is at a time (m)."""
+        """Returns its place at a time (m)."""
         here = self.position
         for move in self.moves:
             if move.to is not None:
@@ -108,11 +108,11 @@ class HeldPlace:
         return aim
 
     def angle_at(self, time: float) -> float:
-        """How far a clamp has been turned about its tangent (rad)."""
+        """Returns the angle by which a clamp has been turned about its tangent (rad)."""
         return math.tau * sum(spin.turns * spin.progress(time) for spin in self.spins)
 
 
-def read_holds(table: Table, spec: HoseSpec) -> tuple[HeldPlace, ...]:
+def read_holds(table: TomlTable, spec: HoseSpec) -> tuple[Grasp, ...]:
     """Returns the holds of a file, by rising arc length.
 
     Raises:
@@ -130,7 +130,7 @@ def read_holds(table: Table, spec: HoseSpec) -> tuple[HeldPlace, ...]:
     return tuple(hold for _, hold in read)
 
 
-def read_place(table: Table, length: float) -> float:
+def read_place(table: TomlTable, length: float) -> float:
     """The arc length at the key `at`: a number (m), "start" or "end"."""
     ends = {"start": 0.0, "end": length}
     if isinstance(table.value("at"), str):
@@ -138,7 +138,7 @@ def read_place(table: Table, length: float) -> float:
     return table.number("at", least=0.0, most=length)
 
 
-def _read_hold(table: Table, spec: HoseSpec) -> HeldPlace:
+def _read_hold(table: TomlTable, spec: HoseSpec) -> Grasp:
     place = read_place(table, spec.length)
     table.require("kind", "clamp, which holds point and direction, or attach, which holds a point")
     clamped = table.word("kind", ("clamp", "attach")) == "clamp"
@@ -148,7 +148,7 @@ def _read_hold(table: Table, spec: HoseSpec) -> HeldPlace:
     tangent = _read_tangent(table, clamped)
     if clamped and tangent is None:
         raise table.fail("tangent", None, "three numbers, the direction of rising arc length")
-    hold = HeldPlace(
+    hold = Grasp(
         place,
         position,
         tangent,
@@ -167,36 +167,36 @@ def _read_hold(table: Table, spec: HoseSpec) -> HeldPlace:
     return hold
 
 
-def _read_timed(table: Table) -> Timed:
+def _read_times(table: TomlTable) -> tuple[float, float, str]:
+    """The numbers of a `Timed`."""
     start = table.number("start", 0.0, least=0.0, most=LONGEST)
     duration = table.number("duration", least=1e-4, most=LONGEST)
-    return Timed(start, duration, table.word("profile", PROFILES, "smooth"))
+    return start, duration, table.word("profile", PROFILES, "smooth")
 
 
-def _read_move(table: Table, clamped: bool) -> Movement:
-    timed = _read_timed(table)
+def _read_move(table: TomlTable, clamped: bool) -> Movement:
+    times = _read_times(table)
     to, tangent = _read_position(table, "to"), _read_tangent(table, clamped)
     if to is None and tangent is None:
         raise table.fail("to", None, "three numbers (m), or a tangent, or both")
     table.finish()
-    return Movement(timed.start, timed.duration, timed.profile, to, tangent)
+    return Movement(*times, to, tangent)
 
 
-def _read_spin(table: Table) -> Spin:
-    timed = _read_timed(table)
-    turns = table.number("turns", least=-1e4, most=1e4)
+def _read_spin(table: TomlTable) -> Spin:
+    spin = Spin(*_read_times(table), table.number("turns", least=-1e4, most=1e4))
     table.finish()
-    return Spin(timed.start, timed.duration, timed.profile, turns)
+    return spin
 
 
-def _read_position(table: Table, key: str) -> Vector | None:
+def _read_position(table: TomlTable, key: str) -> Vector | None:
     place: Vector | None = table.vector(key)
     if place is not None and max(map(abs, place)) > FARTHEST:
         raise table.fail(key, list(place), f"three numbers within {FARTHEST:g} m of the origin")
     return place
 
 
-def _read_tangent(table: Table, clamped: bool) -> Vector | None:
+def _read_tangent(table: TomlTable, clamped: bool) -> Vector | None:
     aim: Vector | None = table.vector("tangent")
     if aim is not None and not clamped:
         raise table.fail("tangent", list(aim), "left out for kind = 'attach'")
@@ -206,7 +206,7 @@ def _read_tangent(table: Table, clamped: bool) -> Vector | None:
 
 
 def _read_director(
-    table: Table, tangent: Vector | None, place: float, spec: HoseSpec
+    table: TomlTable, tangent: Vector | None, place: float, spec: HoseSpec
 ) -> Vector | None:
     """m1 across the tangent; what is laid is laid from its beginning on, where we can choose."""
     given: Vector | None = table.vector("director")
@@ -226,7 +226,7 @@ def _read_director(
     return _scale(across)
 
 
-def _check_reach(table: Table, one: HeldPlace, other: HeldPlace, gap: float) -> None:
+def _check_reach(table: TomlTable, one: Grasp, other: Grasp, gap: float) -> None:
     """The distance of two holds stays within the length of hose between them."""
     times = {0.0}
     for change in (*one.changes, *other.changes):

@@ -10,17 +10,19 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from hose_mj.assets import find_assets
+from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.grasps import (
     FARTHEST,
     LONGEST,
-    HeldPlace,
+    Grasp,
     Vector,
     read_holds,
     read_place,
 )
 from hose_mj.scenes.hose_file.spec import read_spec
-from hose_mj.toml_table import Table, read_toml
+from hose_mj.toml_table import TomlTable, read_toml
 
 STARTS = ("equilibrium", "as-laid")
 GRAVITY: Vector = (0.0, 0.0, -9.81)
@@ -47,8 +49,8 @@ class Floor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OwnHose:
-    """What a user's file says.
+class UserHose:
+    """A user's hose as its file describes it.
 
     Attributes:
         title: one line.
@@ -66,7 +68,7 @@ class OwnHose:
 
     title: str
     spec: HoseSpec
-    holds: tuple[HeldPlace, ...]
+    holds: tuple[Grasp, ...]
     loads: tuple[PointLoad, ...]
     gravity: Vector
     floor: Floor | None
@@ -78,16 +80,32 @@ class OwnHose:
 
     @property
     def moves(self) -> bool:
-        """Whether a hold is moved or turned."""
+        """Says whether a hold is moved or turned."""
         return any(hold.changes for hold in self.holds)
 
     @property
     def spins(self) -> bool:
-        """Whether a clamp is turned about its tangent."""
+        """Says whether a clamp is turned about its tangent."""
         return any(hold.spins for hold in self.holds)
 
 
-def read_own_hose(path: Path) -> OwnHose:
+def find_hose_file(path: Path) -> Path:
+    """Returns a user's file, or the example of that name that comes with hose_mj.
+
+    Raises:
+        InputError: there is neither.
+    """
+    examples = find_assets() / "hoses"
+    example = examples / f"{path}.toml"
+    if path.exists():
+        return path
+    if not example.is_file():
+        names = ", ".join(sorted(file.stem for file in examples.glob("*.toml")))
+        raise InputError("my_hose", str(path), f"a TOML file, or an example: {names}")
+    return example
+
+
+def read_hose_file(path: Path) -> UserHose:
     """Reads a user's hose.
 
     Raises:
@@ -104,13 +122,13 @@ def read_own_hose(path: Path) -> OwnHose:
     gravity, loads = _read_loads(file.table("loads"), spec.length)
     floor = _read_floor(file.table("floor"))
     shape = file.points("shape")
-    study = file.table("study") or Table({}, path.name, "study")
+    study = file.table("study") or TomlTable({}, path.name, "study")
     duration, start = _read_times(study, holds)
     errors = study.numbers("errors", ERRORS, above=1e-6, most=0.5)
     budget = study.number("budget", BUDGET, least=1.0, most=LONGEST)
     study.finish()
     file.finish()
-    own = OwnHose(
+    user = UserHose(
         title=title,
         spec=spec,
         holds=holds,
@@ -123,13 +141,13 @@ def read_own_hose(path: Path) -> OwnHose:
         errors=tuple(sorted(set(errors), reverse=True)),
         budget=budget,
     )
-    _check_held(own, file)
-    _check_shape(own, file)
-    _check_floor(own, file)
-    return own
+    _check_held(user, file)
+    _check_shape(user, file)
+    _check_floor(user, file)
+    return user
 
 
-def _read_loads(table: Table | None, length: float) -> tuple[Vector, tuple[PointLoad, ...]]:
+def _read_loads(table: TomlTable | None, length: float) -> tuple[Vector, tuple[PointLoad, ...]]:
     if table is None:
         return GRAVITY, ()
     gravity: Vector = table.vector("gravity", GRAVITY)
@@ -148,7 +166,7 @@ def _read_loads(table: Table | None, length: float) -> tuple[Vector, tuple[Point
     return gravity, tuple(loads)
 
 
-def _read_floor(table: Table | None) -> Floor | None:
+def _read_floor(table: TomlTable | None) -> Floor | None:
     if table is None:
         return None
     height = table.number("height", 0.0, least=-FARTHEST, most=FARTHEST)
@@ -157,7 +175,7 @@ def _read_floor(table: Table | None) -> Floor | None:
     return floor
 
 
-def _read_times(study: Table, holds: tuple[HeldPlace, ...]) -> tuple[float | None, str]:
+def _read_times(study: TomlTable, holds: tuple[Grasp, ...]) -> tuple[float | None, str]:
     """Duration and start; what moves is by default followed to the end of its last movement."""
     last = max((change.end for hold in holds for change in hold.changes), default=None)
     duration = last
@@ -171,46 +189,46 @@ def _read_times(study: Table, holds: tuple[HeldPlace, ...]) -> tuple[float | Non
     return duration, start
 
 
-def _check_held(own: OwnHose, file: Table) -> None:
+def _check_held(user: UserHose, file: TomlTable) -> None:
     """There is no rest shape of a hose that nothing holds."""
-    if own.duration is not None and own.start == "as-laid":
+    if user.duration is not None and user.start == "as-laid":
         return
-    if not own.holds:
+    if not user.holds:
         raise file.fail("holds", None, "one hold or more, or study.start = 'as-laid'")
 
 
-def _check_shape(own: OwnHose, file: Table) -> None:
+def _check_shape(user: UserHose, file: TomlTable) -> None:
     """The points are as long as the hose, and the holds are on their line."""
-    if own.shape is None:
+    if user.shape is None:
         return
-    if max(abs(x) for point in own.shape for x in point) > FARTHEST:
+    if max(abs(x) for point in user.shape for x in point) > FARTHEST:
         raise file.fail("shape", "a far point", f"points within {FARTHEST:g} m of the origin")
-    length = sum(math.dist(a, b) for a, b in pairwise(own.shape))
-    if abs(length - own.spec.length) > _SHAPE_SLACK * own.spec.length:
-        valid = f"points along {own.spec.length:g} m, within {100 * _SHAPE_SLACK:g} %"
+    length = sum(math.dist(a, b) for a, b in pairwise(user.shape))
+    if abs(length - user.spec.length) > _SHAPE_SLACK * user.spec.length:
+        valid = f"points along {user.spec.length:g} m, within {100 * _SHAPE_SLACK:g} %"
         raise file.fail("shape", f"a line of {length:g} m", valid)
-    for hold in own.holds:
-        here = find_on_line(own.shape, hold.arc_length / own.spec.length)
-        if math.dist(here, hold.position) > _SHAPE_SLACK * own.spec.length:
+    for hold in user.holds:
+        here = compute_place_on_line(user.shape, hold.arc_length / user.spec.length)
+        if math.dist(here, hold.position) > _SHAPE_SLACK * user.spec.length:
             valid = f"a line that passes the hold at {hold.arc_length:g} m at its position"
             raise file.fail("shape", [round(x, 6) for x in here], valid)
 
 
-def _check_floor(own: OwnHose, file: Table) -> None:
+def _check_floor(user: UserHose, file: TomlTable) -> None:
     """Holds and the line of the user stay above the floor, by the hose's radius at least."""
-    if own.floor is None:
+    if user.floor is None:
         return
-    least = own.floor.height + own.spec.outer_radius
-    held = [hold.position for hold in own.holds]
-    held += [move.to for hold in own.holds for move in hold.moves if move.to is not None]
-    for key, places in (("holds", held), ("shape", own.shape or ())):
+    least = user.floor.height + user.spec.outer_radius
+    held = [hold.position for hold in user.holds]
+    held += [move.to for hold in user.holds for move in hold.moves if move.to is not None]
+    for key, places in (("holds", held), ("shape", user.shape or ())):
         for place in places:
             if place[2] < least - 1e-9:
                 valid = f"at or above z = {least:g} m, a radius above the floor"
                 raise file.fail(key, list(place), valid)
 
 
-def find_on_line(points: tuple[Vector, ...], share: float) -> Vector:
+def compute_place_on_line(points: tuple[Vector, ...], share: float) -> Vector:
     """The place at a share of the length of a line through points."""
     left = share * sum(math.dist(a, b) for a, b in pairwise(points))
     for one, other in pairwise(points):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hose_mj.errors import InputError
 from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_catalogue
 from hose_mj.hoses.spec import Fitting, HoseSpec, complete_section
-from hose_mj.toml_table import Table
+from hose_mj.toml_table import TomlTable
 
 LENGTHS = (1e-3, 1e4)
 """A hose is at least and at most so long (m)."""
@@ -26,7 +26,7 @@ _SLENDER = 0.25
 """The radius is at most this fraction of the length."""
 
 
-def read_spec(table: Table) -> HoseSpec:
+def read_spec(table: TomlTable) -> HoseSpec:
     """Returns the hose of a table [hose].
 
     A ready hose (`like`) and a material (`material`) give numbers first; the numbers that stand in
@@ -58,7 +58,7 @@ def read_spec(table: Table) -> HoseSpec:
         raise table.fail(error.thing, error.value, error.valid) from error
 
 
-def _gather(table: Table) -> dict[str, float]:
+def _gather(table: TomlTable) -> dict[str, float]:
     """Numbers of the ready hose, of the material, then of the table itself."""
     given: dict[str, float] = {}
     like, material = table.text("like"), table.text("material")
@@ -75,7 +75,7 @@ def _gather(table: Table) -> dict[str, float]:
     return given
 
 
-def _read_fitting(table: Table, length: float) -> Fitting:
+def _read_fitting(table: TomlTable, length: float) -> Fitting:
     start = table.number("start", least=0.0, most=length)
     end = table.number("end", above=start, most=length)
     values = {key: table.find_number(key, above=0.0) for key in _FITTING_KEYS}

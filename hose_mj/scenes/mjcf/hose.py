@@ -10,7 +10,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, read_catalogue
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.spec import LENGTHS, read_spec
-from hose_mj.toml_table import LARGEST_NUMBER, Table
+from hose_mj.toml_table import LARGEST_NUMBER, TomlTable
 
 _OUTER, _OLD_OUTER = "hose_outer_radius", "hose_radius"
 _RADII = {_OUTER: "outer_diameter", "hose_inner_radius": "inner_diameter"}
@@ -61,7 +61,7 @@ def read_hose(
     values |= {key: 2.0 * given[name] for name, key in _RADII.items() if name in given}
     values |= _find_material(texts, file)
     try:
-        return read_spec(Table(values, file))
+        return read_spec(TomlTable(values, file))
     except InputError as error:
         raise _rename(error, given, file) from error
 

@@ -1,1 +1,1 @@
-"""What `hose-mj compare` writes: tables, pictures and the HTML page."""
+"""The files that `hose-mj compare` writes: tables, pictures and the HTML page."""

@@ -1,53 +1,114 @@
-"""The page of `hose-mj compare`: what was measured, in the order a physicist asks for it."""
+"""Files of `hose-mj compare`, each written in one piece: numbers, plots, recording, the page.
+
+The page says what was measured in the order a physicist asks for it; the words that depend on no
+measurement stand in texts.md.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 
-from hose_mj.recording.page import Page, Picture, Section
+from hose_mj.recording.document import format_document
+from hose_mj.recording.files import write_atomically
+from hose_mj.recording.page import Block, Page, Picture, Section
 from hose_mj.recording.palette import name_model
+from hose_mj.recording.parquet import write_records
+from hose_mj.recording.plots.api import format_seconds
+from hose_mj.recording.rerun import write_recording
+from hose_mj.validation import settings
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
-from hose_mj.validation.report.own_page import write_own
+from hose_mj.validation.report.findings import describe_findings, make_answer_row
 from hose_mj.validation.report.pictures import (
     HERO,
     Pictures,
     choose_ratios,
+    draw_all,
     group_statics,
+    make_scene,
+    name_setting,
 )
-from hose_mj.validation.report.tables import HEADER, TIMES, make_ratio_row, make_row, write_runs
-from hose_mj.validation.report.texts import write_method, write_physics
-from hose_mj.validation.run import EQUAL_ERRORS
+from hose_mj.validation.run import EQUAL_ERRORS, RunResult
 from hose_mj.validation.study import Study
+from hose_mj.validation.user_hose.study import UserHoseStudy
 
+TIMES = "\u00d7"
+HEADER = ["model", "resolution", "step", "scheme", "clamp", "error", "wall s / sim s", "fallbacks"]
 _STATIC_COLUMNS = (0, 1, 2, 5, 6)
 """Columns of case and `HEADER` that a static case fills."""
+_RATIO_HEADER = ["case", "error", "against", "GEDS is cheaper by", "GEDS at", "the other at"]
+_TEXTS = Path(__file__).with_name("texts.md")
+
+
+def write_all(study: Study, document: dict[str, Any], folder: Path) -> Path:
+    """Writes everything into a folder and returns the path of report.html."""
+    write_records(
+        document["records"],
+        folder / "records.parquet",
+        folder / "records.csv",
+        metadata={name: str(document[name]) for name in ("version", "revision", "machine")},
+        types={"timestep": float, "clamp_corrected": bool, "wall_s_per_sim_s": float},
+    )
+    write_atomically(folder / "document.json", format_document(document).encode())
+    pictures = draw_all(study)
+    for name, png in pictures.items():
+        write_atomically(folder / "plots" / f"{name}.png", png)
+    motions = [result for result in study.results if study.user or result.case.motion is not None]
+    motions.sort(key=lambda result: result.case.id != HERO)  # the first is the one in view
+    scenes = [s for result in motions if (s := make_scene(result, study.shown_within)) is not None]
+    if scenes:
+        shown = {str(k): str(v) for k, v in document["settings"].items()}
+        shown["revision"] = str(document["revision"])
+        write_recording(folder / "models.rrd", scenes, shown, "hose-mj-compare")
+    return make_report(study, document, pictures, folder / "report.html")
 
 
 def make_report(study: Study, document: dict[str, Any], pictures: Pictures, path: Path) -> Path:
     """Writes the page and returns its path."""
-    machine = document["machine"]
+    machine, user = document["machine"], study.user
     page = Page(
-        study.own.own.title if study.own else "GEDS against MuJoCo's cable and closed forms",
+        user.hose.title if user else "GEDS against MuJoCo's cable and closed forms",
         subtitle=f"hose-mj {document['version']}, revision {str(document['revision'])[:12]}",
         footer=f"{machine['cpu']}, {machine['cores']} cores, {machine['os']}, "
         f"Python {machine['python']}, seed {document['seed']}",
     )
-    if study.own is not None:
-        write_own(page, study.own, study.ratios, pictures)
-        write_physics(page)
+    if user is not None:
+        _write_user_hose(page, user, study.ratios, pictures)
+        write_text(page, "The physics in brief")
     else:
         _write_glance(page, study, pictures)
-        write_physics(page)
+        write_text(page, "The physics in brief")
         _write_motions(page, study, pictures)
         _write_statics(page, study, pictures)
+        _write_committed(page, study)
         _write_numerics(page, pictures)
-        write_method(page, study.quick)
+        _write_method(page, settings.QUICK if study.quick else settings.FULL)
     page.write(path)
     return path
+
+
+def write_text(page: Page, heading: str, **values: object) -> Section:
+    """Adds the section of texts.md under a heading: paragraphs, and indented equations (number)."""
+    parts = _TEXTS.read_text(encoding="utf-8").split("\n# ")
+    _, *paragraphs = next(p for p in parts if p.startswith(f"{heading}\n")).strip().split("\n\n")
+    section = page.section(heading)
+    for text in paragraphs:
+        equation = re.fullmatch(r"    (.*)    \((\w+)\)", text)
+        if equation is not None:
+            section.equation(equation[1], equation[2])
+        else:
+            section.paragraph(Template(text).substitute(values))
+    return section
+
+
+def _list_pictures(pictures: Pictures, alts: dict[str, str]) -> list[Picture]:
+    """The pictures by file name that were drawn, with what they show below them."""
+    return [Picture(pictures[name], alt, alt) for name, alt in alts.items() if name in pictures]
 
 
 def _write_glance(page: Page, study: Study, pictures: Pictures) -> None:
@@ -62,11 +123,7 @@ def _write_glance(page: Page, study: Study, pictures: Pictures) -> None:
     _write_verdict(section, study.ratios)
     if "overview" in pictures:
         section.figures([Picture(pictures["overview"], _OVERVIEW)])
-    pair = [
-        Picture(pictures[name], alt, alt)
-        for name, alt in _GLANCE_STATICS.items()
-        if name in pictures
-    ]
+    pair = _list_pictures(pictures, _GLANCE_STATICS)
     if pair:
         section.figures(pair)
     _write_ratios(section, study)
@@ -100,31 +157,23 @@ def _write_verdict(section: Section, ratios: Sequence[Ratio]) -> None:
 def _write_ratios(section: Section, study: Study) -> None:
     cases = list(dict.fromkeys(ratio.case for ratio in study.ratios))
     like = [ratio for case in cases for ratio in choose_ratios(study.ratios, case)]
-    header = ["case", "error", "against", "GEDS is cheaper by", "GEDS at", "the other at"]
     if like:
         caption = (
             "Wall time at equal error, every model at its cheapest setting of the grid; like "
             "against like: space against the cable and the flex, plane against the hinge chain."
         )
-        section.table(header, [make_ratio_row(ratio) for ratio in like], caption)
+        section.table(_RATIO_HEADER, [make_ratio_row(ratio) for ratio in like], caption)
     rest = [ratio for ratio in study.ratios if ratio not in like]
     if rest:
         fold = section.fold(f"{len(rest)} more ratios, space against plane")
-        fold.table(header, [make_ratio_row(ratio) for ratio in rest])
+        fold.table(_RATIO_HEADER, [make_ratio_row(ratio) for ratio in rest])
 
 
 def _write_motions(page: Page, study: Study, pictures: Pictures) -> None:
     motions = [result for result in study.results if result.case.motion is not None]
     if not motions:
         return
-    section = page.section("Motions")
-    section.paragraph(
-        "Error: largest distance from the converged motion over the whole run, as a fraction of "
-        "the length. A line joins a model's best settings, labelled with control points or "
-        "segments and time step; hollow marks on dotted lines have MuJoCo's clamp as documented, "
-        "filled ones have it corrected by half a segment. Bars along a level say how many times "
-        "as long the other model takes at equal error."
-    )
+    section = write_text(page, "Motions")
     section.link("models.rrd: the motions overlaid, for the Rerun viewer", "models.rrd")
     for result in motions:
         _write_motion(section, result, pictures)
@@ -160,13 +209,11 @@ def _write_motion(section: Section, result: CaseResult, pictures: Pictures) -> N
 
 
 def _describe_references(result: CaseResult) -> str:
-    parts = []
-    for name, reference in (
-        ("the reference of GEDS", result.stretchable),
-        ("the inextensible one of the chains", result.inextensible),
-    ):
-        if reference is not None:
-            parts.append(f"{name} is converged to {reference.uncertainty:.1e} L")
+    named = {
+        "the reference of GEDS": result.stretchable,
+        "the inextensible one of the chains": result.inextensible,
+    }
+    parts = [f"{n} is converged to {r.uncertainty:.1e} L" for n, r in named.items() if r]
     text = ", ".join(parts) + "."
     text = text[0].upper() + text[1:]
     if result.stretchable is not None and result.inextensible is not None and result.case.scale:
@@ -185,11 +232,7 @@ def _write_statics(page: Page, study: Study, pictures: Pictures) -> None:
     groups = group_statics(study.results)
     if not groups:
         return
-    section = page.section("Statics and frequencies against closed forms")
-    section.paragraph(
-        "A panel for each model, a line for each parameter, error over resolution. Dotted lines "
-        "through hollow marks have MuJoCo's clamp as documented."
-    )
+    section = write_text(page, "Statics and frequencies against closed forms")
     header = ["case", *HEADER]
     for family, members in groups.items():
         block = section.subsection(family.replace("-", " ").capitalize())
@@ -206,9 +249,23 @@ def _write_statics(page: Page, study: Study, pictures: Pictures) -> None:
             block.figure(drawn[0].png, drawn[0].alt)
         rows = [[r.case.id, *make_row(o)] for r in members for o in r.outcomes]
         if rows:
-            columns = [header[k] for k in _STATIC_COLUMNS]
             kept = [[row[k] for k in _STATIC_COLUMNS] for row in rows]
+            columns = [header[k] for k in _STATIC_COLUMNS]
             block.fold(f"All {len(rows)} numbers").table(columns, kept)
+
+
+def _write_committed(page: Page, study: Study) -> None:
+    """The runs of the cable that stand in for it where MuJoCo has none."""
+    cable = study.committed
+    if cable is None:
+        return
+    section = write_text(
+        page, "MuJoCo's cable, as committed", here=cable.here, mujoco=cable.mujoco, cpu=cable.cpu
+    )
+    columns = ("case", "resolution", "timestep", "scheme", "error", "wall_s_per_sim_s")
+    fold = section.fold(f"All {len(cable.records)} runs")
+    rows = [[record[name] for name in columns] for record in cable.records]
+    fold.table(["case", "segments", "step (s)", "scheme", "error", "wall s / sim s"], rows)
 
 
 def _write_numerics(page: Page, pictures: Pictures) -> None:
@@ -222,3 +279,100 @@ def _write_numerics(page: Page, pictures: Pictures) -> None:
     section = page.section("GEDS's own numerics")
     section.paragraph("Each line ends in its name and its measured slope.")
     section.figures([Picture(pictures[name], name.replace("-", " ")) for name in names])
+
+
+def _write_method(page: Page, grid: settings.Grid) -> None:
+    """Writes how the peers were treated, and the grid of settings."""
+    section = write_text(
+        page,
+        "How the peers were treated",
+        largest_step=f"{1e3 * settings.LARGEST_STEP:g}",
+        stagnation=f"{100 * settings.STAGNATION:g}",
+        cable_twist=f"{settings.CABLE_TWIST:g}",
+    )
+    section.fold("The grid of settings").definitions(
+        {
+            "GEDS control points": ", ".join(map(str, grid.dynamic["geds"])),
+            "chain segments": ", ".join(map(str, grid.dynamic["hinge-chain"])),
+            "GEDS schemes": "; ".join(grid.schemes["geds"]) + "; Newton tolerance 1e-3 L",
+            "flex segments": ", ".join(map(str, grid.dynamic["flex"])),
+            "cable integrators": ", ".join(grid.schemes["cable"]),
+            "hinge-chain integrators": ", ".join(grid.schemes["hinge-chain"]),
+            "flex integrator": ", ".join(grid.schemes["flex"]),
+            "MuJoCo solver": "Newton, 100 iterations, tolerance 1e-8, the faster Jacobian: "
+            "chains dense, flex sparse",
+            "longest run scored": f"{grid.longest_run:g} s",
+            "timing": f"least of {grid.rounds} rounds, all models in turn, one thread",
+        }
+    )
+
+
+def _write_user_hose(
+    page: Page, study: UserHoseStudy, ratios: Sequence[Ratio], pictures: Pictures
+) -> None:
+    """Writes what was asked, what was found, the pictures, all runs."""
+    section = page.section("At a glance")
+    section.paragraph(study.result.case.about)
+    for line in describe_findings(study):
+        section.paragraph(line)
+    header = ["within", "model", "resolution", "step", "error", "wall s / sim s"]
+    caption = "The cheapest setting within a wanted error, as a fraction of the length."
+    rows = [make_answer_row(answer, study.cut_short) for answer in study.answers]
+    section.table(header, rows, caption)
+    like = choose_ratios(ratios, study.result.case.id)
+    if like:
+        rows_of_ratios = [make_ratio_row(ratio) for ratio in like]
+        section.table(_RATIO_HEADER, rows_of_ratios, "Wall time at equal error.")
+    section.checks(study.checks)
+    section.link("models.rrd: the models overlaid, for the Rerun viewer", "models.rrd")
+    drawn = _list_pictures(pictures, _USER_HOSE_PICTURES)
+    if drawn:
+        page.section("Pictures").figures(drawn)
+    write_runs(write_text(page, "How it was measured"), study.result)
+
+
+_USER_HOSE_PICTURES = {
+    "own-hose-shapes": "Shapes; at several instants the earlier are the paler",
+    "own-hose-work-precision": "Error over cost: a line joins a model's best settings",
+    "own-hose-distance": "Distance between the models' centre lines over time",
+    "own-hose": "Error over resolution",
+}
+
+
+def make_ratio_row(ratio: Ratio) -> list[object]:
+    """Case, level, peer, how many times cheaper GEDS is, and both settings."""
+    labels = (ratio.model_setting, ratio.against_setting)
+    ours, theirs = (shorten_label(label).partition(", ")[2] for label in labels)
+    level, times = f"{100 * ratio.at_error:g} %", f"{ratio.wall_ratio:.3g}{TIMES}"
+    return [ratio.case, level, ratio.against, times, ours, theirs]
+
+
+def shorten_label(label: str) -> str:
+    """A label without what goes without saying, and "0.833333 ms" written as "833 \u00b5s"."""
+    label = label.removesuffix(", clamp-corrected").replace("control ", "")
+    return re.sub(r"([\d.]+) ms", lambda m: format_seconds(1e-3 * float(m[1])), label)
+
+
+def make_row(run: RunResult) -> list[Any]:
+    """The cells under `HEADER`."""
+    setting, wall = run.setting, run.wall_s_per_sim_s
+    return [
+        setting.model,
+        setting.resolution,
+        "" if setting.timestep is None else name_setting(run).split(", ")[-1],
+        setting.scheme,
+        {None: "", True: "corrected", False: "raw"}[setting.clamp_corrected],
+        f"{100 * run.error:.3g} %",
+        "" if wall is None else f"{wall:.3g}",
+        run.fallbacks,
+    ]
+
+
+def write_runs(block: Block, result: CaseResult) -> None:
+    """Adds folds with all runs and with all settings that were not scored."""
+    if result.outcomes:
+        fold = block.fold(f"All {len(result.outcomes)} runs")
+        fold.table(HEADER, [make_row(outcome) for outcome in result.outcomes])
+    if result.skipped:
+        fold = block.fold(f"{len(result.skipped)} settings not scored")
+        fold.table(["setting", "why"], [[s.setting.label, s.why] for s in result.skipped])

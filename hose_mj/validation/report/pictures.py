@@ -1,4 +1,4 @@
-"""Pictures of `hose-mj compare`: what is drawn of which case, with which words."""
+"""Pictures and scenes of `hose-mj compare`: what is drawn of which case, with which words."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.registry import MODELS, find_model
+from hose_mj.recording.episode import HoseTrack, Scene, Series
+from hose_mj.recording.palette import find_color
 from hose_mj.recording.plots import api as plots
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
-from hose_mj.validation.report.obstacles import find_outlines
-from hose_mj.validation.run import Outcome
+from hose_mj.validation.run import RunResult
 from hose_mj.validation.study import SHOWN_WITHIN, Study
 
 Pictures = dict[str, bytes]
@@ -29,6 +31,10 @@ PARAMETERS = {
 FANS = ("heavy-cantilever", "tip-load", "end-moment")
 HERO = "released-rod"
 """The case of the overview."""
+COMMITTED = "cable (committed)"
+"""The series of the cable's committed runs."""
+_N_DIRECTIONS = 96
+"""Directions in which the farthest point of an obstacle is sought for its outline."""
 
 
 def draw_all(study: Study) -> Pictures:
@@ -36,13 +42,13 @@ def draw_all(study: Study) -> Pictures:
     pictures: Pictures = {}
     for result in study.results:
         if result.case.motion is not None and result.outcomes:
-            pictures.update(_draw_motion(result, study.ratios, study.shown_within))
+            pictures.update(_draw_motion(result, study))
             if result.case.id == HERO and _has_hero_models(result):
-                pictures["overview"] = draw_overview(result, study.ratios)
+                pictures["overview"] = draw_overview(result, study)
     for family, members in group_statics(study.results).items():
         pictures.update(_draw_statics(family, members))
     pictures.update(_draw_numerics(study))
-    if study.own is not None and study.own.own.duration is None and study.outcomes:
+    if study.user is not None and study.user.hose.duration is None and study.outcomes:
         pictures.update(_draw_rest(study.results[0], study.shown_within))
     return pictures
 
@@ -56,7 +62,7 @@ def group_statics(results: list[CaseResult]) -> dict[str, list[CaseResult]]:
     return groups
 
 
-def choose_shown(result: CaseResult, within: float) -> dict[str, Outcome]:
+def choose_shown(result: CaseResult, within: float) -> dict[str, RunResult]:
     """The run of each model that pictures show: the cheapest within an error, or the best."""
     shown = {}
     for model in dict.fromkeys(outcome.setting.model for outcome in result.outcomes):
@@ -68,19 +74,19 @@ def choose_shown(result: CaseResult, within: float) -> dict[str, Outcome]:
     return shown
 
 
-def compute_distance(one: Outcome, other: Outcome) -> np.ndarray:
+def compute_distance(one: RunResult, other: RunResult) -> np.ndarray:
     """Largest distance between two centre lines at each instant, (k,), m."""
     return np.asarray(np.max(np.linalg.norm(one.points - other.points, axis=2), axis=1))
 
 
-def name_setting(outcome: Outcome) -> str:
+def name_setting(outcome: RunResult) -> str:
     """Resolution and time step, short: "12, 2.5 ms"."""
     setting = outcome.setting
     step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
     return f"{setting.resolution}{step}"
 
 
-def describe_setting(outcome: Outcome) -> str:
+def describe_setting(outcome: RunResult) -> str:
     """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
     setting = outcome.setting
     size = find_model(setting.model).resolution.replace("_", " ")
@@ -88,7 +94,7 @@ def describe_setting(outcome: Outcome) -> str:
     return f"{setting.model}, {setting.resolution} {size}{step}"
 
 
-def name_series(outcome: Outcome) -> str:
+def name_series(outcome: RunResult) -> str:
     """Model id, or "geds planar" for GEDS in a plane."""
     setting = outcome.setting
     return "geds planar" if setting.model == "geds" and setting.planar else setting.model
@@ -103,7 +109,7 @@ def choose_ratios(ratios: Iterable[Ratio], case_id: str) -> list[Ratio]:
     ]
 
 
-def draw_overview(result: CaseResult, ratios: list[Ratio]) -> bytes:
+def draw_overview(result: CaseResult, study: Study) -> bytes:
     """The motion at the left, errors and costs at the right: the picture of the README."""
     shown = {m: o for m, o in choose_shown(result, SHOWN_WITHIN).items() if m in ("geds", "cable")}
     curves, times = _pick_snapshots(shown)
@@ -111,7 +117,7 @@ def draw_overview(result: CaseResult, ratios: list[Ratio]) -> bytes:
     left = "A rod is let go"
     if len(shown) == 2:
         left += f"\n{names[0]} control points of GEDS over {names[1]} segments of MuJoCo's cable"
-    gaps = _list_gaps(result, ratios)
+    gaps = _list_gaps(result, study.ratios)
     best = max((gap for gap in gaps if gap.against == "cable"), key=_ratio_of, default=None)
     right = "What accuracy costs\nbest settings of each model; lower left is better"
     if best is not None:
@@ -120,7 +126,7 @@ def draw_overview(result: CaseResult, ratios: list[Ratio]) -> bytes:
             f"At {level} error the cable takes {factor} as long"
             "\nbest settings of each model; labels: control points or segments, time step"
         )
-    return plots.plot_overview(curves, times, _list_work(result), gaps, (left, right))
+    return plots.plot_overview(curves, times, _list_work(result, study), gaps, (left, right))
 
 
 def _has_hero_models(result: CaseResult) -> bool:
@@ -131,8 +137,9 @@ def _ratio_of(gap: plots.Gap) -> float:
     return gap.cost_against / gap.cost
 
 
-def _list_work(result: CaseResult) -> list[plots.WorkPoint]:
-    return [
+def _list_work(result: CaseResult, study: Study) -> list[plots.WorkPoint]:
+    """A point for each run, and for each committed one of the cable where it cannot run."""
+    points = [
         plots.WorkPoint(
             name_series(outcome),
             name_setting(outcome),
@@ -142,6 +149,12 @@ def _list_work(result: CaseResult) -> list[plots.WorkPoint]:
         )
         for outcome in result.outcomes
     ]
+    for record in study.committed.records if study.committed else ():
+        if record["case"] == result.case.id and record["timestep"] is not None:
+            label = f"{record['resolution']}, {plots.format_seconds(record['timestep'])}"
+            cost, clamp = record["wall_s_per_sim_s"], record["clamp_corrected"]
+            points.append(plots.WorkPoint(COMMITTED, label, record["error"], cost, clamp))
+    return points
 
 
 def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[plots.Gap]:
@@ -157,7 +170,7 @@ def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[plots.Gap]:
     return gaps
 
 
-def _pick_snapshots(shown: dict[str, Outcome]) -> tuple[dict[str, np.ndarray], list[float]]:
+def _pick_snapshots(shown: dict[str, RunResult]) -> tuple[dict[str, np.ndarray], list[float]]:
     """Centre lines by legend entry, (N_SNAPSHOTS, m, 3), and their times (s)."""
     one = next(iter(shown.values()))
     picks = np.linspace(0, len(one.times) - 1, N_SNAPSHOTS).round().astype(int)
@@ -165,17 +178,17 @@ def _pick_snapshots(shown: dict[str, Outcome]) -> tuple[dict[str, np.ndarray], l
     return curves, [float(one.times[k]) for k in picks]
 
 
-def _draw_motion(result: CaseResult, ratios: list[Ratio], within: float) -> Pictures:
+def _draw_motion(result: CaseResult, study: Study) -> Pictures:
     case = result.case
     pictures = {
         f"{case.id}-work-precision": plots.plot_work_precision(
-            case.title, _list_work(result), _list_gaps(result, ratios)
+            case.title, _list_work(result, study), _list_gaps(result, study.ratios)
         )
     }
-    shown = choose_shown(result, within)
+    shown = choose_shown(result, study.shown_within)
     curves, times = _pick_snapshots(shown)
     plane = choose_plane(curves.values())
-    outlines = find_outlines(case.obstacles, plane)
+    outlines = compute_outlines(case.obstacles, plane)
     pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, plane, times, outlines)
     if "geds" in shown and len(shown) > 1:
         pictures[f"{case.id}-distance"] = _draw_distance(shown)
@@ -200,18 +213,21 @@ def choose_plane(curves: Iterable[np.ndarray]) -> tuple[int, int]:
     return (0, 2) if extent[0] >= extent[1] else (1, 2)
 
 
-def _draw_distance(shown: dict[str, Outcome]) -> bytes:
+def _measure_gaps(shown: dict[str, RunResult]) -> tuple[dict[str, np.ndarray], str]:
+    """Distances from GEDS over time by model, in a unit that suits the largest; and that unit."""
+    gaps = {m: compute_distance(shown["geds"], o) for m, o in shown.items() if m != "geds"}
+    largest = max((float(gap.max()) for gap in gaps.values()), default=0.0)
+    unit, factor = plots.choose_length_unit(largest)
+    return {model: factor * gap for model, gap in gaps.items()}, unit
+
+
+def _draw_distance(shown: dict[str, RunResult]) -> bytes:
     ours = shown["geds"]
-    gaps = {
-        f"{model} {name_setting(outcome)}": compute_distance(ours, outcome)
-        for model, outcome in shown.items()
-        if model != "geds"
-    }
-    unit, factor = plots.choose_length_unit(max(float(gap.max()) for gap in gaps.values()))
+    gaps, unit = _measure_gaps(shown)
     return plots.plot_series(
         f"Largest distance from GEDS {name_setting(ours)}",
         f"distance ({unit})",
-        {label: (ours.times, factor * gap) for label, gap in gaps.items()},
+        {f"{m} {name_setting(shown[m])}": (ours.times, gap) for m, gap in gaps.items()},
     )
 
 
@@ -239,7 +255,7 @@ def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
         plane = choose_plane([curve])
         across = np.sort(np.ptp(curve, axis=0))
         if across[1] > 0.01 * across[2]:  # a straight line is no picture
-            outlines = find_outlines(case.obstacles, plane)
+            outlines = compute_outlines(case.obstacles, plane)
             curves = {describe_setting(ours): curve}
             pictures[f"{family}-shapes"] = plots.plot_shapes(
                 title, curves, plane, outlines=outlines
@@ -272,7 +288,7 @@ def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> 
     return plots.Fan(name, curves, dotted=True)
 
 
-def _far_from_20(outcome: Outcome) -> int:
+def _far_from_20(outcome: RunResult) -> int:
     return abs(outcome.setting.resolution - 20)
 
 
@@ -307,3 +323,68 @@ def _draw_numerics(study: Study) -> Pictures:
             limits={"bound, +0.1 %": 0.1},
         )
     return pictures
+
+
+def make_scene(result: CaseResult, within: float) -> Scene | None:
+    """The models of a motion overlaid, with their distances from GEDS; None without a run."""
+    shown = choose_shown(result, within)
+    if not shown:
+        return None
+    case = result.case
+    tracks = tuple(
+        HoseTrack(
+            f"{model} {name_setting(outcome)}",
+            np.linspace(0.0, case.spec.length, outcome.points.shape[1]),
+            outcome.times,
+            outcome.points,
+            case.spec.outer_radius,
+            find_color(model),
+        )
+        for model, outcome in shown.items()
+    )
+    errors = "\n".join(
+        f"- {outcome.setting.label}: error {100 * outcome.error:.2g} %"
+        for outcome in shown.values()
+    )
+    return Scene(case.id, case.title, tracks, _list_distances(shown), f"{case.about}\n\n{errors}")
+
+
+def _list_distances(shown: dict[str, RunResult]) -> tuple[Series, ...]:
+    """Distances from GEDS, in millimetres where they are small."""
+    if "geds" not in shown:
+        return ()
+    gaps, unit = _measure_gaps(shown)
+    return tuple(Series(f"{m} to GEDS", shown[m].times, gap, unit) for m, gap in gaps.items())
+
+
+def compute_outline(obstacle: Obstacle, view: tuple[int, int]) -> np.ndarray | None:
+    """Outline (k, 2) of a shape as seen along the third axis: its farthest points all around.
+
+    None for a plane, which has none.
+    """
+    if obstacle.kind == "plane":
+        return None
+    angle = np.linspace(0.0, 2.0 * np.pi, _N_DIRECTIONS, endpoint=False)
+    directions = np.zeros((_N_DIRECTIONS, 3))
+    directions[:, view[0]], directions[:, view[1]] = np.cos(angle), np.sin(angle)
+    rotation = np.asarray(obstacle.rotation)
+    radius, half, _ = np.asarray(obstacle.size)
+    local = directions @ rotation
+    if obstacle.kind == "box":
+        far = np.sign(local) * obstacle.size
+    elif obstacle.kind == "cylinder":
+        far = np.zeros_like(local)
+        across = np.linalg.norm(local[:, :2], axis=1, keepdims=True)
+        far[:, :2] = radius * local[:, :2] / np.maximum(across, 1e-12)
+        far[:, 2] = half * np.sign(local[:, 2])
+    else:
+        far = radius * local
+        far[:, 2] += half * np.sign(local[:, 2])
+    points = far @ rotation.T + obstacle.position
+    return np.asarray(points[:, list(view)])
+
+
+def compute_outlines(obstacles: tuple[Obstacle, ...], view: tuple[int, int]) -> list[np.ndarray]:
+    """Outlines of all that have one."""
+    found = (compute_outline(obstacle, view) for obstacle in obstacles)
+    return [outline for outline in found if outline is not None]

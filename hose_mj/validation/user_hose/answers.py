@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hose_mj.validation.compare import find_cheapest
-from hose_mj.validation.run import Outcome
+from hose_mj.validation.run import RunResult
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How far the best run of a model stays from the converged hose.
+    """The distance at which the best run of a model stays from the converged hose.
 
     Attributes:
         model: its id.
@@ -54,7 +54,7 @@ class Disagreement:
 
 
 def list_answers(
-    outcomes: list[Outcome], models: Sequence[str], errors: Sequence[float]
+    outcomes: list[RunResult], models: Sequence[str], errors: Sequence[float]
 ) -> list[Answer]:
     """The cheapest setting of each model within each error; GEDS in a plane where it ran there."""
     kinds = [(model, False) for model in models]
@@ -63,7 +63,7 @@ def list_answers(
     answers = []
     for at_error in errors:
         for model, planar in kinds:
-            best = _find_best(outcomes, model, at_error, planar)
+            best = _choose_best(outcomes, model, at_error, planar)
             answer = Answer(at_error, model, planar)
             if best is not None:
                 setting = best.setting
@@ -79,9 +79,9 @@ def list_answers(
     return answers
 
 
-def _find_best(
-    outcomes: list[Outcome], model: str, at_error: float, planar: bool
-) -> Outcome | None:
+def _choose_best(
+    outcomes: list[RunResult], model: str, at_error: float, planar: bool
+) -> RunResult | None:
     """The cheapest run within an error; of rest shapes, whose cost says little, the coarsest."""
     if any(outcome.sim_s is not None for outcome in outcomes):
         return find_cheapest(outcomes, model, at_error, planar=planar)
@@ -92,9 +92,9 @@ def _find_best(
     return None
 
 
-def list_disagreements(outcomes: list[Outcome], length: float) -> list[Disagreement]:
+def list_disagreements(outcomes: list[RunResult], length: float) -> list[Disagreement]:
     """The run of each model, and of each clamp, that came closest."""
-    best: dict[tuple[str, bool | None], Outcome] = {}
+    best: dict[tuple[str, bool | None], RunResult] = {}
     for outcome in outcomes:
         kind = (outcome.setting.model, outcome.setting.clamp_corrected)
         if kind not in best or outcome.error < best[kind].error:

@@ -14,7 +14,7 @@ from hose_mj.assets import find_assets
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.grasps import turn_towards
-from hose_mj.scenes.hose_file.hose_file import find_on_line, read_own_hose
+from hose_mj.scenes.hose_file.hose_file import compute_place_on_line, read_hose_file
 from hose_mj.toml_table import LARGEST_FILE
 
 EXAMPLES = sorted(find_assets().glob("hoses/*.toml"))
@@ -48,7 +48,7 @@ def read(tmp_path):
     def read_text(text):
         path = tmp_path / "mine.toml"
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read_own_hose(path)
+        return read_hose_file(path)
 
     return read_text
 
@@ -58,23 +58,23 @@ def test_six_examples_are_read():
         *("fire_hose", "garden_hose", "suture_thread", "telephone_cord", "usb_cable", "wire_rope"),
     ]
     for path in EXAMPLES:
-        own = read_own_hose(path)
-        assert own.title
-        assert own.holds
+        user = read_hose_file(path)
+        assert user.title
+        assert user.holds
 
 
 def test_what_is_left_out_has_a_default(read):
-    own = read(HOSE + HOLD)
-    assert own.title == "mine"
-    assert own.gravity == (0.0, 0.0, -9.81)
-    assert own.errors == (0.01, 0.001)
-    assert own.duration is own.floor is own.shape is None
-    assert not own.moves
-    assert not own.spins
-    (hold,) = own.holds
+    user = read(HOSE + HOLD)
+    assert user.title == "mine"
+    assert user.gravity == (0.0, 0.0, -9.81)
+    assert user.errors == (0.01, 0.001)
+    assert user.duration is user.floor is user.shape is None
+    assert not user.moves
+    assert not user.spins
+    (hold,) = user.holds
     assert (hold.arc_length, hold.position, hold.tangent) == (0.0, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
     # Nothing is known of the torsional stiffness: that of a round section with nu = 0.3.
-    assert own.spec.torsional_stiffness == pytest.approx(0.05 / 1.3)
+    assert user.spec.torsional_stiffness == pytest.approx(0.05 / 1.3)
 
 
 def test_a_section_and_a_material_make_the_stiffnesses(read):
@@ -97,21 +97,21 @@ def test_a_section_and_a_material_make_the_stiffnesses(read):
 
 
 def test_a_ready_hose_and_the_mass_of_the_whole(read):
-    own = read("[hose]\nlike = 'usb-cable'\nlength = 1\n" + HOLD)
-    assert own.spec.bending_stiffness == 2.64e-4
+    user = read("[hose]\nlike = 'usb-cable'\nlength = 1\n" + HOLD)
+    assert user.spec.bending_stiffness == 2.64e-4
     heavy = read(HOSE.replace("linear_density = 0.1", "mass = 0.5") + HOLD)
     assert heavy.spec.linear_density == 0.25
 
 
 def test_fittings(read):
-    own = read(HOSE + "[[hose.fittings]]\nstart = 0.0\nend = 0.1\nbending_stiffness = 5\n" + HOLD)
-    (fitting,) = own.spec.fittings
+    user = read(HOSE + "[[hose.fittings]]\nstart = 0.0\nend = 0.1\nbending_stiffness = 5\n" + HOLD)
+    (fitting,) = user.spec.fittings
     assert (fitting.start, fitting.end, fitting.bending_stiffness) == (0.0, 0.1, 5.0)
     assert fitting.axial_stiffness is None
 
 
 def test_holds_move_and_turn_in_time(read):
-    own = read(
+    user = read(
         HOSE
         + HOLD
         + "spin = { turns = 2, duration = 1.0 }\n"
@@ -120,9 +120,9 @@ def test_holds_move_and_turn_in_time(read):
         + "[[holds.move]]\nto = [0.5, 0, 1]\nduration = 2.0\n"
         + "[[holds.move]]\nto = [0.5, 1, 1]\nstart = 3.0\nduration = 1.0\nprofile = 'linear'\n"
     )
-    clamp, end = own.holds
-    assert own.duration == 4.0
-    assert own.start == "equilibrium"
+    clamp, end = user.holds
+    assert user.duration == 4.0
+    assert user.start == "equilibrium"
     assert clamp.angle_at(0.5) == pytest.approx(2 * math.pi)
     assert clamp.angle_at(9.0) == pytest.approx(4 * math.pi)
     assert clamp.tangent_at(1.0) == (1.0, 0.0, 0.0)
@@ -156,10 +156,10 @@ def test_a_tangent_turns_round():
 
 def test_a_place_on_a_line():
     corner = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 3.0, 0.0))
-    assert find_on_line(corner, 0.0) == (0.0, 0.0, 0.0)
-    assert find_on_line(corner, 0.125) == (0.5, 0.0, 0.0)
-    assert find_on_line(corner, 0.5) == (1.0, 1.0, 0.0)
-    assert find_on_line(corner, 1.0) == (1.0, 3.0, 0.0)
+    assert compute_place_on_line(corner, 0.0) == (0.0, 0.0, 0.0)
+    assert compute_place_on_line(corner, 0.125) == (0.5, 0.0, 0.0)
+    assert compute_place_on_line(corner, 0.5) == (1.0, 1.0, 0.0)
+    assert compute_place_on_line(corner, 1.0) == (1.0, 3.0, 0.0)
 
 
 MOVE = "move = { to = [1.9, 0, 1], duration = 1 }\n"
@@ -262,9 +262,9 @@ def test_what_is_no_toml(read, data):
 
 def test_files_that_cannot_be_read(read, tmp_path):
     with pytest.raises(InputError, match="No such file"):
-        read_own_hose(tmp_path / "none.toml")
+        read_hose_file(tmp_path / "none.toml")
     with pytest.raises(InputError, match="valid: a file to be read"):
-        read_own_hose(tmp_path)
+        read_hose_file(tmp_path)
     with pytest.raises(InputError, match="at most 1000000 bytes"):
         read(b"#" * (LARGEST_FILE + 1))
 
@@ -318,7 +318,7 @@ def to_toml(value):
 def complain(path):
     """What is wrong with a file, on one line; None where it is read. All else is a defect."""
     try:
-        read_own_hose(path)
+        read_hose_file(path)
     except InputError as error:
         message = str(error)
     else:

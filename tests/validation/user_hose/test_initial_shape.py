@@ -11,11 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hose_mj.assets import find_asset
-from hose_mj.scenes.hose_file.grasps import HeldPlace
-from hose_mj.scenes.hose_file.hose_file import read_own_hose
-from hose_mj.validation.user_hose.initial_shape import bend_between, make_line
+from hose_mj.scenes.hose_file.grasps import Grasp
+from hose_mj.scenes.hose_file.hose_file import read_hose_file
+from hose_mj.validation.user_hose.case import bend_between, make_line
 
-OWN = read_own_hose(find_asset("hoses/garden_hose.toml"))
+OWN = read_hose_file(find_asset("hoses/garden_hose.toml"))
 LENGTH = OWN.spec.length
 DOWN = (0.0, 0.0, -9.81)
 vectors = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: math.hypot(*v) > 0.1)
@@ -47,8 +47,8 @@ def test_a_curve_of_a_given_length_between_two_clamps(one, other, aim, share, gr
 @example((0.0, 0.0, 1.0), (0.0, 1e-112, 0.0), 0.25)  # straight up from a clamp, and back to it
 @given(units, st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.floats(0.1, 0.9))
 def test_a_line_passes_its_holds_evenly(tangent, position, share):
-    inside = HeldPlace(share * LENGTH, tuple(share * LENGTH * x for x in position), None)
-    line = lay(HeldPlace(0.0, (0.0, 0.0, 0.0), tangent), inside)
+    inside = Grasp(share * LENGTH, tuple(share * LENGTH * x for x in position), None)
+    line = lay(Grasp(0.0, (0.0, 0.0, 0.0), tangent), inside)
     np.testing.assert_allclose(line(np.array([0.0]))[0], 0.0, atol=1e-9)
     np.testing.assert_allclose(line(np.array([inside.arc_length]))[0], inside.position, atol=1e-6)
     assert measure(line(np.linspace(0.0, LENGTH, 4001))) == pytest.approx(LENGTH, rel=2e-2)
@@ -57,7 +57,7 @@ def test_a_line_passes_its_holds_evenly(tangent, position, share):
 @pytest.mark.parametrize("gravity", [DOWN, (0.0, 0.0, 0.0)])
 @pytest.mark.parametrize("end", [0.0, LENGTH])
 def test_from_a_single_attachment_it_hangs(gravity, end):
-    line = lay(HeldPlace(end, (0.3, 0.2, 1.0), None), gravity=gravity)
+    line = lay(Grasp(end, (0.3, 0.2, 1.0), None), gravity=gravity)
     far = line(np.array([LENGTH - end]))[0] - [0.3, 0.2, 1.0]
     expected = [0.0, 0.0, -LENGTH] if any(gravity) else [LENGTH if end == 0.0 else -LENGTH, 0, 0]
     np.testing.assert_allclose(far, expected, atol=1e-9)
@@ -76,7 +76,7 @@ def test_along_the_points_of_the_user():
 @pytest.mark.parametrize("torsion", [0.0, 3.0, -2.0])
 def test_a_coil_has_its_curvature_and_torsion(torsion):
     spec = replace(OWN.spec, rest_curvature=5.0, rest_torsion=torsion)
-    clamp = HeldPlace(0.0, (1.0, 2.0, 3.0), (0.0, 0.0, 1.0))
+    clamp = Grasp(0.0, (1.0, 2.0, 3.0), (0.0, 0.0, 1.0))
     line = lay(clamp, spec=spec)
     h, s = 1e-3, 1.3
     points = line(s + h * np.arange(-2.0, 3.0))

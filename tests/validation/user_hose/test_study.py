@@ -11,21 +11,21 @@ import pytest
 
 from hose_mj.assets import find_asset
 from hose_mj.errors import InputError
-from hose_mj.scenes.hose_file.hose_file import Floor, read_own_hose
+from hose_mj.scenes.hose_file.hose_file import Floor, read_hose_file
 from hose_mj.validation.run import Skipped
 from hose_mj.validation.settings import Setting
-from hose_mj.validation.user_hose import study as own_study
+from hose_mj.validation.user_hose import study as user_study
 from hose_mj.validation.user_hose.answers import list_answers, list_disagreements
-from hose_mj.validation.user_hose.case import find_fineness, make_case
+from hose_mj.validation.user_hose.case import compute_fineness, make_case
 from hose_mj.validation.user_hose.study import (
     GRID,
-    list_own_models,
-    list_own_steps,
-    run_own_study,
+    list_halving_steps,
+    list_models,
+    run_user_hose_study,
 )
 
-GARDEN = read_own_hose(find_asset("hoses/garden_hose.toml"))
-USB = read_own_hose(find_asset("hoses/usb_cable.toml"))
+GARDEN = read_hose_file(find_asset("hoses/garden_hose.toml"))
+USB = read_hose_file(find_asset("hoses/usb_cable.toml"))
 
 
 def silent(text):
@@ -76,18 +76,18 @@ def test_the_disagreement_of_each_model_and_clamp(make_outcome):
 
 def test_steps_halve_and_divide_the_pauses(case):
     for model, scheme in (("geds", "bdf2"), ("cable", "euler")):
-        steps = list_own_steps(model, scheme, 10, case, GRID)
+        steps = list_halving_steps(model, scheme, 10, case, GRID)
         assert steps[0] == {"geds": 0.01, "cable": 0.005}[model]
         assert all(one == 2 * other for one, other in pairwise(steps))
         assert all((case.motion.pause / step).is_integer() for step in steps)
-    assert list_own_steps("geds", "bdf2", 10, case, GRID)[-1] >= GRID.smallest_geds_step
+    assert list_halving_steps("geds", "bdf2", 10, case, GRID)[-1] >= GRID.smallest_geds_step
     # An undamped chain is not tried far above its limit, h^2 sqrt(rho / EI / 12), 4 ms above.
     limit = 0.01**2 * (0.1 / 0.05 / 12) ** 0.5
-    assert list_own_steps("cable", "euler", 100, case, GRID)[0] < 2.2 * limit
+    assert list_halving_steps("cable", "euler", 100, case, GRID)[0] < 2.2 * limit
 
 
 def test_geds_and_the_cable_find_one_rest_shape():
-    study = run_own_study(USB, list_own_models(), silent)
+    study = run_user_hose_study(USB, list_models(), silent)
     assert study.refused == {}
     assert study.result.stretchable.uncertainty < 1e-6
     assert study.stretch < 1e-5
@@ -103,32 +103,37 @@ def test_geds_and_the_cable_find_one_rest_shape():
 
 
 def test_without_chains_there_is_no_second_reference():
-    study = run_own_study(USB, ("geds",), silent)
+    study = run_user_hose_study(USB, ("geds",), silent)
     assert study.result.inextensible is study.stretch is None
     assert {o.setting.model for o in study.result.outcomes} == {"geds"}
 
 
 def refuse(*models):
-    """A `find_obstacle` that finds one in these models."""
-    return lambda own, model: InputError("floor", 0.0, "left out") if model in models else None
+    """A `check_supported` that refuses these models."""
+
+    def check(user, model):
+        if model in models:
+            raise InputError("floor", 0.0, "left out")
+
+    return check
 
 
 def test_what_geds_cannot_do_is_an_error(monkeypatch):
-    monkeypatch.setattr(own_study, "find_obstacle", refuse("geds"))
+    monkeypatch.setattr(user_study, "check_supported", refuse("geds"))
     with pytest.raises(InputError, match="floor is 0"):
-        run_own_study(USB, ("cable",), silent)
+        run_user_hose_study(USB, ("cable",), silent)
 
 
 def test_what_another_model_cannot_do_is_told(monkeypatch):
-    monkeypatch.setattr(own_study, "find_obstacle", refuse("cable"))
-    study = run_own_study(USB, ("geds", "cable"), silent)
+    monkeypatch.setattr(user_study, "check_supported", refuse("cable"))
+    study = run_user_hose_study(USB, ("geds", "cable"), silent)
     assert study.refused == {"cable": "floor is 0.0; valid: left out"}
     assert {a.model for a in study.answers} == {"geds"}
 
 
 def test_a_spent_budget_leaves_runs_out_and_says_so():
     short = replace(GARDEN, duration=0.2, budget=1e-3)
-    study = run_own_study(short, ("geds", "cable"), silent)
+    study = run_user_hose_study(short, ("geds", "cable"), silent)
     assert study.result.stretchable is not None
     assert study.result.outcomes == []
     assert study.result.skipped
@@ -140,7 +145,9 @@ def test_a_spent_budget_leaves_runs_out_and_says_so():
 
 @pytest.mark.slow
 def test_the_garden_hose():
-    study = run_own_study(replace(GARDEN, duration=0.5, budget=20.0), ("geds", "cable"), silent)
+    study = run_user_hose_study(
+        replace(GARDEN, duration=0.5, budget=20.0), ("geds", "cable"), silent
+    )
     (check,) = study.checks
     assert check.ok
     reached = {a.model for a in study.answers if a.error is not None and a.at_error == 0.01}
@@ -160,28 +167,28 @@ def test_the_floor_is_an_obstacle_of_the_case():
 
 @pytest.mark.parametrize(("name", "turns"), [("telephone_cord", 10.0), ("fire_hose", 0.0)])
 def test_a_coil_and_a_ribbon_come_to_rest(name, turns):
-    own = read_own_hose(find_asset(f"hoses/{name}.toml"))
-    fineness = find_fineness(own)
+    user = read_hose_file(find_asset(f"hoses/{name}.toml"))
+    fineness = compute_fineness(user)
     assert fineness == max(1, math.ceil(turns / 2.0))
-    case = make_case(own)
+    case = make_case(user)
     found = []
     for n in (24, 48):
         hose = Setting("geds", "statics", n * fineness).make(case)
         case.lay(hose)
         found.append(case.probe(hose))
     # Held at its first place, and the coarse hose agrees with the one twice as fine.
-    np.testing.assert_allclose(found[1][:3], own.holds[0].position, atol=1e-9)
-    assert np.max(np.abs(found[1] - found[0])) < 0.01 * own.spec.length
+    np.testing.assert_allclose(found[1][:3], user.holds[0].position, atol=1e-9)
+    assert np.max(np.abs(found[1] - found[0])) < 0.01 * user.spec.length
 
 
 def test_a_director_decides_which_way_a_ribbon_is_stiff():
-    own = read_own_hose(find_asset("hoses/fire_hose.toml"))
+    user = read_hose_file(find_asset("hoses/fire_hose.toml"))
     drops = []
     # m1 across: the flat side is up, as by default. m1 up: it lies on edge, and twists over.
     for director in ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
-        case = make_case(replace(own, holds=(replace(own.holds[0], director=director),)))
+        case = make_case(replace(user, holds=(replace(user.holds[0], director=director),)))
         hose = Setting("geds", "statics", 24).make(case)
         case.lay(hose)
-        drops.append(own.holds[0].position[2] - case.probe(hose)[-1])
+        drops.append(user.holds[0].position[2] - case.probe(hose)[-1])
     flat, on_edge = drops
-    assert flat > on_edge + 0.02 * own.spec.length
+    assert flat > on_edge + 0.02 * user.spec.length

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.hoses.obstacles import Obstacle
-from hose_mj.validation.report.obstacles import find_outline, find_outlines
+from hose_mj.validation.report.pictures import compute_outline, compute_outlines
 
 TURN = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
 """Turns the axis z to (.8, 0, .6)."""
@@ -22,10 +22,10 @@ TURN = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
 def test_an_outline_reaches_as_far_as_the_shape(kind, size, reach):
     place = np.array([1.0, 2.0, 3.0])
     obstacle = Obstacle(kind=kind, position=place, rotation=TURN, size=size)
-    outline = find_outline(obstacle, (0, 2))
+    outline = compute_outline(obstacle, (0, 2))
     np.testing.assert_allclose(np.ptp(outline, axis=0), 2 * np.array(reach), rtol=2e-3)
     np.testing.assert_allclose(outline.mean(axis=0), place[[0, 2]], atol=0.02)
 
 
 def test_planes_have_no_outline():
-    assert find_outlines((Obstacle(kind="plane"),), (0, 2)) == []
+    assert compute_outlines((Obstacle(kind="plane"),), (0, 2)) == []

@@ -7,8 +7,7 @@ import json
 import pytest
 
 from hose_mj.cli import main as cli
-from hose_mj.cli.compare import MODELS
-from hose_mj.cli.compare_own import choose_own_models
+from hose_mj.validation.user_hose.study import check_models, list_models
 
 MINE = """
 title = "My own rod"
@@ -117,10 +116,10 @@ def test_an_example_by_its_name(capsys, tmp_path):
 
 
 def test_models_of_a_users_hose():
-    every = choose_own_models(MODELS)
+    every = list_models()
     assert every[:2] == ("geds", "cable")
     assert "hinge-chain" not in every
-    assert choose_own_models(("cable", "cable")) == ("cable",)
+    assert check_models(("cable", "cable")) == ("cable",)
 
 
 @pytest.mark.parametrize(

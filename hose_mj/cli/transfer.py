@@ -15,7 +15,7 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.transfer.trial import Outcome
+    from hose_learning.transfer import Outcome
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def _check(args: Args) -> None:
 def _run_all(args: Args) -> list[Outcome]:
     """Runs one configuration after the other, each with a generator of its own."""
     import numpy as np
-    from hose_learning.transfer.trial import Plan, run_trial
+    from hose_learning.transfer import Plan, run_trial
 
     from hose_mj.cli.progress import show_progress
     from hose_mj.jit import compile_notice

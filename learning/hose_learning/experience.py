@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hose_learning.experience_kernels import Rows, fill_rows
+from hose_learning.loop import Rows, fill_rows
 from hose_mj.errors import InputError
 from hose_mj.jit import compile_notice
 from hose_mj.recording.files import write_atomically

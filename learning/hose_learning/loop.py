@@ -7,14 +7,28 @@ to be; calling them again goes on exactly where they stopped.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from hose_learning import rules
 from hose_learning.mediators import find_above_thresholds
 from hose_learning.policies import GREEDY, draw_allowed, draw_soft_max, find_best
 from hose_learning.records import EPISODES, EPSILON, FRESH, MOVES, RETURN, SUCCESSES, TEMPERATURE
 from hose_learning.tables import claim, count_free, find
-from hose_mj.jit import bitwise, jitable
+from hose_mj.jit import bitwise, compiled, jitable
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import STEPS, TURN
+from hose_mj.tasks.kernels import (
+    STEPS,
+    TURN,
+    Floats,
+    Integers,
+    apply,
+    compute_rewards,
+    is_cut_off,
+    is_over,
+    mask,
+    observe,
+    reset,
+)
 from hose_mj.tasks.stream import draw_unit
 
 
@@ -222,3 +236,66 @@ def run_joint(task, learner, memory, log, max_moves, max_episodes):  # type: ign
         if is_over or kernels.is_cut_off(task, memory.state):
             end_episode(task, learner, memory, log, events)
     return moves
+
+
+class Rows(NamedTuple):
+    """One row for each move of an agent.
+
+    Attributes:
+        values: all variables as the mover saw them before the move (n, n_variables).
+        agents: who moved (n,).
+        actions: its action (n,).
+        events: what the move caused, as bits (n,).
+        rewards: what the mover got for it, by signal (n, n_signals).
+        next_values: what the mover saw right after its move, before anyone else's
+            (n, n_variables).
+    """
+
+    values: Integers
+    agents: Integers
+    actions: Integers
+    events: Integers
+    rewards: Floats
+    next_values: Integers
+
+
+@compiled
+def fill_rows(record, state, stream, rows):  # type: ignore[no-untyped-def]
+    """Plays random available actions, agents in turn, until all rows are written.
+
+    Args:
+        record: the task's kernel record.
+        state: an initial state, advanced in place through as many episodes as it takes.
+        stream: random numbers for the actions and the resets.
+        rows: written in place.
+    """
+    for k in range(rows.agents.shape[0]):
+        agent = state[TURN]
+        observe(record, state, agent, rows.values[k])
+        action = draw_allowed(mask(record, state, agent), stream)
+        events = apply(record, state, agent, action)
+        rows.agents[k] = agent
+        rows.actions[k] = action
+        rows.events[k] = events
+        compute_rewards(record, events, agent, agent, rows.rewards[k])
+        observe(record, state, agent, rows.next_values[k])
+        if is_over(record, events) or is_cut_off(record, state):
+            reset(record, state, stream)
+
+
+@bitwise
+def find_unvetoed(task, learner, memory, agent):  # type: ignore[no-untyped-def]
+    """Returns, as bits, what nothing forbids the agent in `memory.state`; maybe nothing."""
+    allowed = see(task, learner, memory, agent)
+    if learner.has_thresholds:
+        allowed &= find_above_thresholds(learner, memory, agent, memory.scores.shape[0])
+    return allowed
+
+
+@bitwise
+def add_vetoes(task, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+    """Vetoes an action that the agent took in `memory.state`, where its events are a reason to."""
+    see(task, learner, memory, agent)
+    keep_keys(learner, memory, agent)
+    memory.actions[agent] = action
+    veto(learner, memory, agent, events)

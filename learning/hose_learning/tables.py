@@ -127,3 +127,19 @@ def _copy(table, grown):  # type: ignore[no-untyped-def]
         if table.keys[slot] != _FREE:
             row = claim(grown, table.keys[slot] - 1)
             grown.rows[row] = table.rows[slot]
+
+
+@compiled
+def write_rows(table, keys, rows, origins):  # type: ignore[no-untyped-def]
+    """Writes a row under each key.
+
+    Args:
+        table: the table, with room for all keys.
+        keys: where to write (n,).
+        rows: what to write from (n_rows, width).
+        origins: which row belongs under each key (n,).
+    """
+    for k in range(keys.shape[0]):
+        row = claim(table, keys[k])
+        for column in range(rows.shape[1]):
+            table.rows[row, column] = rows[origins[k], column]

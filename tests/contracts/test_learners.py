@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hose_learning.learners.catalog import LEARNERS, make_settings
 from hose_learning.settings import Exploration
-from hose_learning.study.saving import describe, flatten, load_memory, remake, save_memory
+from hose_learning.study.run_folder import describe, flatten, load_memory, remake, save_memory
 from hose_learning.study.training import Training
 
 from hose_mj.errors import InputError

@@ -14,13 +14,13 @@ from hose_learning import rules
 from hose_learning.learner import make_learner
 from hose_learning.learners.coordination import (
     OPTIONS,
+    Graph,
     add_to_edge,
     choose_on_graph,
     get_edge_value,
     make_coordination,
     maximize_module,
 )
-from hose_learning.learners.graphs import Graph
 from hose_learning.learners.joint import sum_team_reward
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.records import Learner, Memory

@@ -196,7 +196,7 @@ class Training:
         return Episodes(results[:, 0], results[:, 1], np.full(episodes, np.nan))
 
     def restore(self, memory: Memory) -> None:
-        """Goes on from what was learned before (`hose_learning.study.saving`)."""
+        """Goes on from what was learned before (`hose_learning.study.run_folder`)."""
         self.memory = memory
 
 

@@ -17,10 +17,10 @@ from hose_learning.mdp.joint_policy import (
     count_fewest_moves,
     estimate,
     find_idle,
+    make_evaluate,
     make_key,
     play_composed,
 )
-from hose_learning.mdp.q_values import make_evaluate
 from hose_learning.settings import Exploration
 from hose_learning.study.training import Training
 

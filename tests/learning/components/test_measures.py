@@ -6,8 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from hose_learning.prediction.cross_validation import compute_score, cross_validate, make_splits
-from hose_learning.prediction.measures import MEASURES, Confusion, count_confusion
+from hose_learning.prediction.cross_validation import (
+    MEASURES,
+    Confusion,
+    compute_score,
+    count_confusion,
+    cross_validate,
+    make_splits,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -10,8 +10,7 @@ import pytest
 from hose_learning.prediction import offline
 from hose_learning.prediction.attributes import Encoding
 from hose_learning.prediction.classifiers import CLASSIFIERS
-from hose_learning.prediction.cross_validation import Score
-from hose_learning.prediction.measures import MEASURES
+from hose_learning.prediction.cross_validation import MEASURES, Score
 from hose_learning.prediction.offline import Plan, Study, list_checks, list_records, run_study
 
 from hose_mj.errors import InputError

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from hose_learning.learners import catalog
 from hose_learning.loop import see
-from hose_learning.mdp.joint_policy import make_key
-from hose_learning.mdp.q_values import make_evaluate
+from hose_learning.mdp.joint_policy import make_evaluate, make_key
 from hose_learning.settings import Exploration
 from hose_learning.study.training import Training
 from hose_learning.tables import claim, find, make_table
+from hose_learning.transfer import Plan, list_vetoes, make_tasks, run_trial, transfer
 from hose_learning.transfer import transfer as transfer_module
 from hose_learning.transfer import trial as transfer_trial
-from hose_learning.transfer.transfer import transfer
-from hose_learning.transfer.trial import Plan, list_vetoes, make_tasks, run_trial
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels

@@ -6,8 +6,8 @@ import numba
 import numpy as np
 import pytest
 from hose_learning.experience import record_experience
+from hose_learning.learners.usap import UndesiredPredictor
 from hose_learning.prediction import usap_kernels
-from hose_learning.prediction.usap import UndesiredPredictor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.ensemble import RandomForestClassifier

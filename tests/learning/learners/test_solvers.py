@@ -2,8 +2,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hose_learning.learners.coordination import make_scratch
-from hose_learning.learners.graphs import make_graph, order_elimination, read_edges
+from hose_learning.learners.coordination import (
+    make_graph,
+    make_scratch,
+    order_elimination,
+    read_edges,
+)
 from hose_learning.learners.solvers import ASCENT, ELIMINATION, MAX_PLUS, compute_payoff, maximize
 
 from hose_mj.errors import InputError

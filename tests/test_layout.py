@@ -14,7 +14,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 # What each part stands on; the longest prefix of a module's name decides its part.
-_BASE = {"hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets"}
+_BASE = {
+    *("hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.assets", "hose_mj.extras"),
+    "hose_mj.plugins",
+}
 _SCENES = _BASE | {"hose_mj.hoses.spec"}
 _HOSES = _BASE | {"hose_mj.hoses.spec"}
 _WORLD = _SCENES | {"hose_mj.hoses", "hose_mj.scenes"}
@@ -24,7 +27,9 @@ FLOORS = {
     "hose_mj.errors": set(),
     "hose_mj.assets": {"hose_mj.errors"},
     "hose_mj.checks": {"hose_mj.errors"},
+    "hose_mj.extras": {"hose_mj.errors"},
     "hose_mj.jit": set(),
+    "hose_mj.plugins": {"hose_mj.errors"},
     "hose_mj.recording": {"hose_mj", "hose_mj.errors", "hose_mj.checks"},
     "hose_mj.hoses.spec": {"hose_mj.errors"},
     "hose_mj.hoses": _HOSES,
@@ -37,7 +42,7 @@ FLOORS = {
     "hose_mj.envs": {"hose_mj.errors", "hose_mj.jit", "hose_mj.tasks", "hose_mj.recording"},
     "hose_learning": {
         *("hose_mj", "hose_mj.errors", "hose_mj.checks", "hose_mj.jit", "hose_mj.envs"),
-        *("hose_mj.tasks", "hose_mj.recording"),
+        *("hose_mj.tasks", "hose_mj.recording", "hose_mj.extras", "hose_mj.plugins"),
     },
     "hose_mj.cli": {"hose_mj", "hose_learning"},
 }

@@ -16,7 +16,12 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.mdp.partially_constrained import Pair, Propositions, Violation, WrittenPair
+    from hose_learning.mdp.partially_constrained import (
+        Pair,
+        PcmViolation,
+        Propositions,
+        WrittenPair,
+    )
 
 
 @dataclass(frozen=True)
@@ -113,7 +118,7 @@ def choose_pair(args: Args) -> Pair:
     return Pair("", args.source, args.target, options[""], options["source"], options["target"])
 
 
-def make_checks(violations: list[Violation], propositions: Propositions | None) -> list[Check]:
+def make_checks(violations: list[PcmViolation], propositions: Propositions | None) -> list[Check]:
     """Makes the checks: four properties, and for a PCM the two propositions."""
     from hose_learning.mdp.partially_constrained import PROPERTIES
 
@@ -132,7 +137,10 @@ def make_checks(violations: list[Violation], propositions: Propositions | None) 
 
 
 def make_results(
-    pair: Pair, written: WrittenPair, violations: list[Violation], propositions: Propositions | None
+    pair: Pair,
+    written: WrittenPair,
+    violations: list[PcmViolation],
+    propositions: Propositions | None,
 ) -> dict[str, Any]:
     """Returns the document's own entries."""
     actions, names = written.target.model.actions, written.target.model.names
@@ -179,7 +187,10 @@ def list_pairs(args: Args) -> int:
 
 
 def _summarize(
-    pair: Pair, written: WrittenPair, violations: list[Violation], propositions: Propositions | None
+    pair: Pair,
+    written: WrittenPair,
+    violations: list[PcmViolation],
+    propositions: Propositions | None,
 ) -> None:
     sizes = (written.source.model.n_states, written.target.model.n_states)
     print(f"source {pair.source}: {sizes[0]:,} states; target {pair.target}: {sizes[1]:,} states")

@@ -103,7 +103,7 @@ def _check(args: Args) -> None:
         if getattr(args, name) < least:
             raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
     if not catalog.find_learner(args.learner).composes:
-        known = [id for id, entry in catalog.LEARNERS.items() if entry.composes]
+        known = [id for id, entry in catalog.list_learners().items() if entry.composes]
         raise InputError("learner", args.learner, "one of " + ", ".join(known))
 
 

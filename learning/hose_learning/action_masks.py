@@ -16,7 +16,7 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
 from hose_learning.evaluation import make_probe
-from hose_learning.loop import add_vetoes, find_unvetoed
+from hose_learning.loop import add_vetoes, compute_unvetoed
 from hose_learning.study.training import Training
 from hose_learning.tables import count_free, grow
 from hose_mj.envs.episode import Episode, sum_signals
@@ -152,7 +152,7 @@ class VetoMasks:
                 task says.
         """
         self._memory.state[:] = state
-        bits = int(self._call(find_unvetoed, agent))
+        bits = int(self._call(compute_unvetoed, agent))
         actions = np.arange(self.task.n_actions)
         if available is None:
             record = self.task.kernel

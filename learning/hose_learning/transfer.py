@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from hose_learning.learners import catalog
-from hose_learning.modules import Module
+from hose_learning.modules import Kind, Module
 from hose_learning.settings import Exploration
 from hose_learning.study.training import Training
 from hose_learning.tables import Table, count_free, grow, write_rows
@@ -158,9 +158,13 @@ def match_modules(source: Training, target: Training) -> list[Match]:
         valid = f"one whose tables are laid out as those of {target.learner_id}"
         raise InputError("learner of the source", source.learner_id, valid)
     matches = []
-    for kind, table, bases in (("value", "table", "bases"), ("veto", "vetoes", "veto_bases")):
-        modules = [module for module in source.settings.modules if module.kind == kind]
-        others = [module for module in target.settings.modules if module.kind == kind]
+    kinds: tuple[tuple[Kind, str, str], ...] = (
+        ("value", "table", "bases"),
+        ("veto", "vetoes", "veto_bases"),
+    )
+    for kind, table, bases in kinds:
+        modules = source.settings.select(kind)
+        others = target.settings.select(kind)
         names = [module.name for module in others]
         n_written = len(list_written(getattr(source.memory, table))[0])
         for place, module in enumerate(modules):
@@ -222,7 +226,7 @@ PER_SUCCESS = 0.001
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class TransferPlan:
     """What to run.
 
     Attributes:
@@ -245,7 +249,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TransferOutcome:
     """What came of one configuration.
 
     Attributes:
@@ -269,7 +273,7 @@ class Outcome:
     vetoes_lost: int
 
 
-def run_trial(plan: Plan, generator: np.random.Generator) -> Outcome:
+def run_trial(plan: TransferPlan, generator: np.random.Generator) -> TransferOutcome:
     """Runs one configuration; all that is left to chance comes from the generator.
 
     Raises:
@@ -290,7 +294,7 @@ def run_trial(plan: Plan, generator: np.random.Generator) -> Outcome:
         control = _make(plan, target_task, Exploration(), generator)
         found = control.advance(moves=moves).find_successes(target_task)
         controls.append((moves, bool(found.any())))
-    return Outcome(
+    return TransferOutcome(
         modules=modules,
         reached=tuple(ended.find_successes(target_task).tolist()),
         moves=target.moves,
@@ -302,7 +306,7 @@ def run_trial(plan: Plan, generator: np.random.Generator) -> Outcome:
     )
 
 
-def make_tasks(plan: Plan, generator: np.random.Generator) -> tuple[Task, Task]:
+def make_tasks(plan: TransferPlan, generator: np.random.Generator) -> tuple[Task, Task]:
     """Makes both tasks; a line task whose start or goal is random gets one that both keep."""
     target = make_task(plan.target, **plan.target_options)
     source = make_task(plan.source, **plan.source_options)
@@ -336,7 +340,7 @@ def _draw(task: Task, generator: np.random.Generator) -> dict[str, Any]:
 
 
 def _make(
-    plan: Plan, task: Task, exploration: Exploration, generator: np.random.Generator
+    plan: TransferPlan, task: Task, exploration: Exploration, generator: np.random.Generator
 ) -> Training:
     settings = catalog.make_settings(LEARNER, task, plan.values, exploration=exploration)
     return Training(task, LEARNER, settings, generator.spawn(1)[0])

@@ -166,7 +166,7 @@ def compute_turns(clocks: Floats) -> Integers:
     return np.floor(clocks).astype(np.int64)
 
 
-def find_owner(turn: int, n_agents: int) -> int:
+def compute_owner(turn: int, n_agents: int) -> int:
     """Returns delta(t), the agent whose turn it is."""
     return turn % n_agents
 
@@ -212,7 +212,7 @@ def simulate(settings: ConsensusSettings, random: np.random.Generator) -> Record
             following = np.maximum(following, turns)
         for agent in range(n_agents):
             turn = int(turns[agent])
-            own = find_owner(turn, n_agents) == agent and settings.first_turn <= turn < last_turn
+            own = compute_owner(turn, n_agents) == agent and settings.first_turn <= turn < last_turn
             if acting[agent] == IDLE and own and acted[agent] < turn:  # wait turn
                 ends[agent] = now + random.uniform(0.0, settings.action_time)
                 acting[agent] = acted[agent] = turn

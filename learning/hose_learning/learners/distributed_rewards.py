@@ -9,12 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.joint import (
     choose_each,
-    find_next_value,
+    compute_next_value,
     get_last_value,
     set_last_value,
 )
@@ -41,9 +42,7 @@ class DistributedRewards(NamedTuple):
     weights: Floats
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -74,7 +73,7 @@ rules.choose_joint.register(DistributedRewards)(choose_each)
 
 @rules.learn_joint.register(DistributedRewards)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: DistributedRewards, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Moves the value of each agent's action towards the neighbours' rewards and its own future.
 
     Q^i(s, a) <- (1 - alpha) Q^i(s, a) + alpha [sum_j f(i, j) r_j + gamma max_a' Q^i(s', a')]
@@ -83,7 +82,7 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            td_target = rule.discount * find_next_value(memory, agent, module, is_over)
+            td_target = rule.discount * compute_next_value(memory, agent, module, is_over)
             for other in range(memory.actions.shape[0]):
                 td_target += rule.weights[agent, other] * memory.rewards[other, module]
             value = get_last_value(memory, agent, module, action)

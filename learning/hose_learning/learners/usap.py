@@ -11,12 +11,13 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.random import Generator
 from sklearn.ensemble import RandomForestClassifier
 from sklearn.tree import DecisionTreeClassifier
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
-from hose_learning.learners.round_robin import add_rewards, finish, meet
+from hose_learning.learner import Made, make_learner
+from hose_learning.learners.round_robin import add_rewards, end_episode, on_observe
 from hose_learning.prediction.classifiers import count_split_attributes
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, check_range, get_options
@@ -24,7 +25,7 @@ from hose_mj.errors import InputError
 from hose_mj.jit import jitable
 from hose_mj.tasks.checks import check_choice, check_integer
 from hose_mj.tasks.kernels import Floats, Integers
-from hose_mj.tasks.stream import draw_below, make_stream
+from hose_mj.tasks.stream import Stream, draw_below, make_stream
 from hose_mj.tasks.task import Task
 
 N_TREES = 10
@@ -34,7 +35,7 @@ class UndesiredPredictor:
     """Learns from each agent's own moves which of its actions break a constraint at once.
 
     A training loop in plain Python calls `remember` after each move and `veto_mask` before it. A
-    compiled loop takes `buffer`, `forest` and `stream`, calls `usap_kernels.add_instance` and
+    compiled loop takes `buffer`, `forest` and `stream`, calls `add_instance` and
     `compute_veto_mask` with them, and lets Python call `fit` between two of its calls: the arrays
     stay the same ones.
 
@@ -52,8 +53,8 @@ class UndesiredPredictor:
             Algorithm 8.1 to the letter.
 
     Attributes:
-        buffer: the instances, see `usap_kernels.Buffer`.
-        forest: what was learned, see `usap_kernels.Forest`.
+        buffer: the instances, see `Buffer`.
+        forest: what was learned, see `Forest`.
         stream: random numbers.
 
     Raises:
@@ -217,7 +218,9 @@ class Forest(NamedTuple):
 
 
 @jitable
-def add_instance(buffer, values, agent, action, undesired, stream):  # type: ignore[no-untyped-def]
+def add_instance(
+    buffer: Buffer, values: Integers, agent: int, action: int, undesired: int, stream: Stream
+) -> None:
     """Keeps an instance; where its action and class are full it replaces a random one of them.
 
     Args:
@@ -239,7 +242,7 @@ def add_instance(buffer, values, agent, action, undesired, stream):  # type: ign
 
 
 @jitable
-def predict_undesired(forest, values, agent, action):  # type: ignore[no-untyped-def]
+def predict_undesired(forest: Forest, values: Integers, agent: int, action: int) -> float:
     """Returns p(s, a), the probability that an action breaks a constraint at once.
 
     It is 0 while an action has fewer than `minimum` instances of either class.
@@ -263,7 +266,7 @@ def predict_undesired(forest, values, agent, action):  # type: ignore[no-untyped
 
 
 @jitable
-def compute_veto_mask(forest, values, agent):  # type: ignore[no-untyped-def]
+def compute_veto_mask(forest: Forest, values: Integers, agent: int) -> int:
     """Returns, as bits, the actions that the forest of an agent vetoes in what it sees."""
     vetoed = 0
     for action in range(forest.trained.shape[1]):
@@ -273,7 +276,7 @@ def compute_veto_mask(forest, values, agent):  # type: ignore[no-untyped-def]
 
 
 OPTIONS: dict[str, float | str] = {"classifier": "tree", "minimum": 5, "capacity": 1000}
-"""See `prediction.usap.UndesiredPredictor`. The thesis keeps 100 instances of each action and
+"""See `UndesiredPredictor`. The thesis keeps 100 instances of each action and
 class, with which the taxi is not learned."""
 
 
@@ -297,9 +300,7 @@ class Prediction(NamedTuple):
     stream: npt.NDArray[np.uint64]
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -330,16 +331,18 @@ def refresh(task: Task, settings: LearnerSettings, memory: Memory) -> None:
         predictor.fit(agent)
 
 
-@rules.restrict.register(Usap)
+@rules.mask.register(Usap)
 @jitable
-def restrict(rule, memory, agent, allowed):  # type: ignore[no-untyped-def]
+def mask(rule: Usap, memory: Memory, agent: int, allowed: int) -> int:
     """Leaves the actions with p(s, a) < 1/2."""
     return allowed & ~compute_veto_mask(memory.own.forest, memory.values, agent)
 
 
-@rules.gather.register(Usap)
+@rules.accumulate.register(Usap)
 @jitable
-def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+def accumulate(
+    rule: Usap, learner: Learner, memory: Memory, agent: int, action: int, events: int
+) -> None:
     """Keeps the instance <s_t, a_t, omega(r_t)>, and adds rewards as in Algorithm 6.3."""
     label = UNDESIRED if events & rule.undesired else SAFE
     own = memory.own
@@ -348,5 +351,5 @@ def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-unt
 
 
 # All else is as in Algorithm 6.3.
-rules.meet.register(Usap)(meet)
-rules.finish.register(Usap)(finish)
+rules.on_observe.register(Usap)(on_observe)
+rules.end_episode.register(Usap)(end_episode)

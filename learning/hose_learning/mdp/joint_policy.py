@@ -16,7 +16,7 @@ import numpy as np
 from hose_learning import rules
 from hose_learning.evaluation import make_probe
 from hose_learning.loop import see
-from hose_learning.mediators import find_above_thresholds
+from hose_learning.mediators import compute_above_thresholds
 from hose_learning.study.training import Training
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import OVER, Model
@@ -254,8 +254,8 @@ def make_evaluate(training: Training) -> Callable[[int, State], dict[int, float]
         probe.state[:] = np.array(state)
         allowed = see(task.kernel, learner, probe, agent)
         if learner.has_thresholds:
-            allowed &= find_above_thresholds(learner, probe, agent, task.n_actions)
-        rules.weigh(learner.rule, learner, probe, agent)
+            allowed &= compute_above_thresholds(learner, probe, agent, task.n_actions)
+        rules.score(learner.rule, learner, probe, agent)
         scores = probe.scores.tolist()
         return {action: scores[action] for action in range(task.n_actions) if allowed >> action & 1}
 

@@ -12,8 +12,8 @@ from scipy.sparse import csr_array
 from hose_learning.mdp.explicit_mdp import (
     MarkovModel,
     WrittenTask,
+    compute_safe_actions,
     evaluate,
-    find_safe_actions,
     solve,
     write_out,
 )
@@ -36,7 +36,7 @@ TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Violation:
+class PcmViolation:
     """A property of Definition 11 that does not hold.
 
     Attributes:
@@ -61,7 +61,7 @@ class Violation:
 
 def find_violations(
     source: MarkovModel, target: MarkovModel, projection: Integers, reading: Reading = "equal"
-) -> list[Violation]:
+) -> list[PcmViolation]:
     """Checks Definition 11 in every state and action; no violation means: a PCM.
 
     Terminal states have no actions, so property 2 is asked of the target's other states. States
@@ -93,17 +93,17 @@ def find_violations(
     return [violation for violation in checks if violation is not None]
 
 
-def _check_states(target: MarkovModel, projection: Integers) -> Violation | None:
+def _check_states(target: MarkovModel, projection: Integers) -> PcmViolation | None:
     """Property 1."""
     lost = np.flatnonzero(projection == ABSENT)
     if len(lost) == 0:
         return None
-    return Violation(1, len(lost), int(lost[0]), None, "no such state", target.names[lost[0]])
+    return PcmViolation(1, len(lost), int(lost[0]), None, "no such state", target.names[lost[0]])
 
 
 def _check_transitions(
     source: MarkovModel, target: MarkovModel, projection: Integers
-) -> Violation | None:
+) -> PcmViolation | None:
     """Property 2: sum over [t] = [s'] of P_t(s, a, t) equals P_s([s], a, [s'])."""
     kept = np.flatnonzero(projection != ABSENT)
     shape = (target.n_states, source.n_states)
@@ -120,7 +120,7 @@ def _check_transitions(
     if len(wrong) == 0:
         return None
     state, action = divmod(int(rows[wrong[0]]), n_actions)
-    return Violation(
+    return PcmViolation(
         2,
         len(wrong),
         state,
@@ -132,7 +132,7 @@ def _check_transitions(
 
 def _check_rewards(
     source: MarkovModel, target: MarkovModel, projection: Integers, reading: Reading
-) -> Iterator[Violation | None]:
+) -> Iterator[PcmViolation | None]:
     """Properties 3 and 4: R_t(s) against R_s([s])."""
     kept = projection != ABSENT
     in_source = np.where(kept, source.rewards[projection], 0.0)
@@ -148,7 +148,7 @@ def _check_rewards(
             yield None
             continue
         state = int(wrong[0])
-        yield Violation(
+        yield PcmViolation(
             number,
             len(wrong),
             state,
@@ -220,8 +220,8 @@ def compute_propositions(
         projection: [s] of each target state, none of them `ABSENT`.
         discount: gamma.
     """
-    safe = find_safe_actions(target)
-    unsafe_in_source = safe & ~find_safe_actions(source)[projection]
+    safe = compute_safe_actions(target)
+    unsafe_in_source = safe & ~compute_safe_actions(source)[projection]
     transferred = solve(source, discount)[projection]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
     return Propositions(
         unsafe_in_source=int(unsafe_in_source.sum()),

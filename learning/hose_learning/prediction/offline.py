@@ -37,9 +37,9 @@ class Published:
     """A row of a table.
 
     Attributes:
-        measures: by the names of `measures.MEASURES`, as fractions. The last column of Table 8.2b
-            is headed NPV but holds the positive predictive value, which its rows give within half
-            a per cent, so it is `ppv`.
+        measures: by the names of `MEASURES`, as fractions. The last column of Table 8.2b is headed
+            NPV but holds the positive predictive value, which its rows give within half a per cent,
+            so it is `ppv`.
         doubtful: accuracy does not lie between sensitivity and specificity, as it must: one of the
             three is misprinted.
     """
@@ -49,7 +49,7 @@ class Published:
 
 
 @dataclass(frozen=True)
-class Table:
+class PublishedTable:
     """A table of the thesis.
 
     Attributes:
@@ -65,7 +65,7 @@ class Table:
     agents: tuple[dict[str, Published], ...]
 
 
-def read_table(task: str) -> Table | None:
+def read_table(task: str) -> PublishedTable | None:
     """Returns the table about a task, None where there is none."""
     text = files("hose_learning").joinpath("published.json").read_text(encoding="utf-8")
     for table in json.loads(text)["tables"]:
@@ -77,7 +77,7 @@ def read_table(task: str) -> Table | None:
                 }
                 for agent in table["agents"]
             )
-            return Table(table["table"], table["data"], table["cycles"], agents)
+            return PublishedTable(table["table"], table["data"], table["cycles"], agents)
     return None
 
 
@@ -99,7 +99,7 @@ CONFIDENCE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class OfflinePlan:
     """What is to be measured.
 
     Attributes:
@@ -157,13 +157,13 @@ class Result:
 class Study:
     """All results, and the first log."""
 
-    plan: Plan
+    plan: OfflinePlan
     experience: Experience
-    table: Table | None
+    table: PublishedTable | None
     results: tuple[Result, ...]
 
 
-def run_study(plan: Plan, on_fold: Callable[[], object] = lambda: None) -> Study:
+def run_study(plan: OfflinePlan, on_fold: Callable[[], object] = lambda: None) -> Study:
     """Logs random moves, the step limit lifted, and cross-validates all classifiers on them.
 
     Args:
@@ -189,7 +189,7 @@ def run_study(plan: Plan, on_fold: Callable[[], object] = lambda: None) -> Study
 
 
 def score_log(
-    plan: Plan,
+    plan: OfflinePlan,
     experience: Experience,
     generator: np.random.Generator,
     on_fold: Callable[[], object],
@@ -212,7 +212,7 @@ def _make_maker(id: str, setup: Setup) -> MakeClassifier:
     return lambda seed: make_classifier(id, replace(setup, seed=seed))
 
 
-def count_folds(plan: Plan) -> int:
+def count_folds(plan: OfflinePlan) -> int:
     """Returns how often `run_study` calls `on_fold`."""
     folds = (plan.repeats + plan.logs - 1) * plan.folds
     return make_task(plan.task).n_agents * len(CLASSIFIERS) * folds

@@ -28,13 +28,15 @@ from hose_learning.settings import Exploration, LearnerSettings
 from hose_learning.study.training import Episodes, Training
 from hose_learning.tables import is_sound
 from hose_mj.errors import InputError
+from hose_mj.extras import require
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.parquet import write_columns
 from hose_mj.tasks.registry import TASKS, make_task
 
 MANIFEST = "manifest.json"
 DESCRIPTION = ("task", "task_options", "learner", "learner_settings", "seed")
 """What `describe` returns."""
+OLD_NAMES = {"waited": "steps_since_action", "charged": "caused_events"}
+"""Arrays of a memory as checkpoints before version 0.2 name them."""
 Arrays = dict[str, npt.NDArray[Any]]
 
 
@@ -170,7 +172,7 @@ def load_memory(path: Path, like: Memory) -> Memory:
     wanted = flatten(like)
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
+            arrays = {OLD_NAMES.get(name, name): stored[name] for name in stored.files}
     except (ValueError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
         raise InputError("checkpoint", str(path), "an npz file of arrays, whole") from None
     for name, array in wanted.items():
@@ -205,7 +207,7 @@ class RunFolder:
     def create(
         self, training: Training, seed: int, ends: Mapping[str, int | None] | None = None
     ) -> None:
-        """Writes the settings of a new run.
+        """Writes the settings of a new run, once it is sure that its episodes can be written.
 
         Args:
             training: before its first move.
@@ -214,7 +216,9 @@ class RunFolder:
 
         Raises:
             InputError: the folder holds a run already.
+            MissingExtra: the extra `report` is not installed.
         """
+        require("pyarrow", "a run folder")
         if (self.path / CONFIG).exists():
             raise InputError("out", str(self.path), "a folder without a run in it (or --resume it)")
         description = describe(training, seed)
@@ -237,6 +241,7 @@ class RunFolder:
             InputError: no run is in the folder, or a file of it is damaged.
         """
         config = self.read(CONFIG)
+        require("pyarrow", "a run folder")
         description = {name: config.get(name) for name in DESCRIPTION}
         if compute_identity(description) != config.get("identity"):
             valid = "the settings that the run began with (its identity differs)"
@@ -269,6 +274,8 @@ class RunFolder:
                 "success": ended.find_successes(training.task),
                 "return": ended.returns,
             }
+            from hose_mj.recording.parquet import write_columns
+
             # Named after its first episode: a part that is written again takes its own place.
             write_columns(columns, self.path / "episodes" / f"{first:012d}.parquet")
         save_memory(self.path / CHECKPOINT, training.memory)

@@ -1,0 +1,71 @@
+"""What other packages add to hose_mj by entry points: found by group, imported when asked for.
+
+A package names what it adds in its pyproject.toml, here a hose model:
+
+    [project.entry-points."hose_mj.hoses"]
+    my-chain = "my_package.hoses:MY_CHAIN"
+
+Groups: `hose_mj.hoses`, `hose_mj.tasks`, `hose_mj.scenes`, `hose_mj.cases`,
+`hose_learning.learners`. Registries ask for plug-ins only after their own names, which so win.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from hose_mj.errors import InputError
+
+
+def find_plugins(group: str, own: Collection[str] = ()) -> dict[str, EntryPoint]:
+    """Returns the entry points of a group by name, sorted; imports none of them.
+
+    Args:
+        group: such as "hose_mj.hoses".
+        own: the registry's own names, which no package may take.
+
+    Raises:
+        InputError: a name that is the registry's own, or that two packages take.
+    """
+    found: dict[str, EntryPoint] = {}
+    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
+        if entry.name in own:
+            taken = f"a name other than hose_mj's own: {', '.join(own)}"
+            raise InputError(_describe(entry), entry.value, taken)
+        other = found.setdefault(entry.name, entry)
+        if (other.value, _find_package(other)) != (entry.value, _find_package(entry)):
+            taken = f"a name that no other package takes ({_find_package(other)} has it)"
+            raise InputError(_describe(entry), entry.value, taken)
+    return found
+
+
+def load_plugin(entry: EntryPoint, kind: type | tuple[type, ...] = object) -> Any:
+    """Imports what an entry point names.
+
+    Args:
+        entry: one of `find_plugins`.
+        kind: what it must be an instance of; `type` for a class.
+
+    Raises:
+        InputError: it cannot be imported, for whatever reason, or is of another kind; the message
+            names the package.
+    """
+    try:
+        loaded = entry.load()
+    except Exception as error:
+        valid = f"importable ({type(error).__name__}: {error})"
+        raise InputError(_describe(entry), entry.value, valid) from error
+    if not isinstance(loaded, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        wanted = " or ".join(f"a {each.__name__}" for each in kinds)
+        raise InputError(_describe(entry), loaded, wanted)
+    return loaded
+
+
+def _find_package(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else "an unknown package"
+
+
+def _describe(entry: EntryPoint) -> str:
+    return f"entry point {entry.name!r} in {entry.group} of package {_find_package(entry)}"

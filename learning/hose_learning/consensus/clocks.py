@@ -171,14 +171,21 @@ def compute_owner(turn: int, n_agents: int) -> int:
     return turn % n_agents
 
 
-def run_clocks(settings: ConsensusSettings, random: np.random.Generator, n_rounds: int) -> Record:
-    """Lets clocks agree while nobody acts."""
+def _begin(
+    settings: ConsensusSettings, random: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """Draws the clocks' rates, what they show at first, and so what they showed before."""
     rates = draw_rates(settings, random)
     clocks = random.uniform(0.0, settings.offset, settings.n_agents)
-    history = np.tile(clocks, (settings.delay + 1, 1))
+    return rates, clocks, np.tile(clocks, (settings.delay + 1, 1))
+
+
+def run_clocks(settings: ConsensusSettings, random: np.random.Generator, n_rounds: int) -> Record:
+    """Lets clocks agree while nobody acts."""
+    rates, clocks, history = _begin(settings, random)
     seen = []
     for _ in range(n_rounds):
-        seen.append(history[0])
+        seen.append(clocks)
         messages = draw_messages(settings, random)
         clocks = compute_clocks(history, messages, rates * settings.round_time)
         history = np.concatenate([clocks[None], history[:-1]])
@@ -194,9 +201,7 @@ def simulate(settings: ConsensusSettings, random: np.random.Generator) -> Record
     """
     n_agents, h = settings.n_agents, settings.round_time
     last_turn = settings.first_turn + settings.n_turns
-    rates = draw_rates(settings, random)
-    clocks = random.uniform(0.0, settings.offset, n_agents)
-    history = np.tile(clocks, (settings.delay + 1, 1))
+    rates, clocks, history = _begin(settings, random)
     acting = np.full(n_agents, IDLE)
     acted = np.full(n_agents, IDLE)
     ends = np.zeros(n_agents)

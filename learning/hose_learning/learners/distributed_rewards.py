@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from numpy.random import Generator
 
 from hose_learning import rules
@@ -17,17 +16,15 @@ from hose_learning.learners.joint import (
     choose_each,
     compute_next_value,
     get_last_value,
+    make_weights,
     set_last_value,
 )
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.records import Learner, Memory
-from hose_learning.settings import LearnerSettings, check_range, get_options
+from hose_learning.settings import LearnerSettings
 from hose_mj.jit import jitable
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.task import Task
-
-OPTIONS = {"neighbour_weight": 0.5}
-"""What an agent's neighbours weigh together; the rest is the agent's own weight."""
 
 
 class DistributedRewards(NamedTuple):
@@ -46,26 +43,10 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
-        InputError: a wrong option (see `OPTIONS`).
+        InputError: a wrong option (see `joint.NEIGHBOUR_OPTIONS`).
     """
     rule = DistributedRewards(float(settings.discount), make_weights(task.n_agents, settings))
     return make_learner(task, settings, rule, generator)
-
-
-def make_weights(n_agents: int, settings: LearnerSettings) -> Floats:
-    """Makes the weights f(i, j) of the agents i - 1, i, i + 1, which add up to 1 for each i.
-
-    Raises:
-        InputError: a wrong option (see `OPTIONS`).
-    """
-    weight = get_options(settings, OPTIONS)["neighbour_weight"]
-    check_range("neighbour_weight", weight, 0.0, 1.0)
-    weights = np.eye(n_agents)
-    if n_agents > 1:
-        are_neighbours = np.eye(n_agents, k=1) + np.eye(n_agents, k=-1)
-        shares = are_neighbours / are_neighbours.sum(axis=1, keepdims=True)
-        weights = (1.0 - float(weight)) * weights + float(weight) * shares
-    return weights
 
 
 rules.choose_joint.register(DistributedRewards)(choose_each)

@@ -12,11 +12,11 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.distributed_rewards import make_weights
 from hose_learning.learners.joint import (
     choose_each,
     compute_next_value,
     get_last_value,
+    make_weights,
     set_last_value,
 )
 from hose_learning.learners.round_robin import get_learning_rate

@@ -4,12 +4,35 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from hose_learning.loop import choose
 from hose_learning.policies import draw_allowed
 from hose_learning.records import Learner, Memory
+from hose_learning.settings import LearnerSettings, check_range, get_options
 from hose_learning.tables import claim, find
 from hose_mj.jit import jitable
 from hose_mj.tasks import kernels
+from hose_mj.tasks.kernels import Floats
+
+NEIGHBOUR_OPTIONS = {"neighbour_weight": 0.5}
+"""What an agent's neighbours weigh together; the rest is the agent's own weight."""
+
+
+def make_weights(n_agents: int, settings: LearnerSettings) -> Floats:
+    """Makes the weights f(i, j) of the agents i - 1, i, i + 1, which add up to 1 for each i.
+
+    Raises:
+        InputError: a wrong option (see `NEIGHBOUR_OPTIONS`).
+    """
+    weight = get_options(settings, NEIGHBOUR_OPTIONS)["neighbour_weight"]
+    check_range("neighbour_weight", weight, 0.0, 1.0)
+    weights = np.eye(n_agents)
+    if n_agents > 1:
+        are_neighbours = np.eye(n_agents, k=1) + np.eye(n_agents, k=-1)
+        shares = are_neighbours / are_neighbours.sum(axis=1, keepdims=True)
+        weights = (1.0 - float(weight)) * weights + float(weight) * shares
+    return weights
 
 
 @jitable

@@ -13,7 +13,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.round_robin import learn
+from hose_learning.learners.round_robin import end_episode, learn
 from hose_learning.mediators import compute_highest
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, get_options
@@ -70,12 +70,5 @@ def accumulate(
         memory.rewards[agent, module] = learner.rewards[events, 1, module]
 
 
-@rules.end_episode.register(Messages)
-@jitable
-def end_episode(rule: Messages, learner: Learner, memory: Memory, is_over: bool) -> None:
-    """After a terminal state the message is zero."""
-    for agent in range(memory.steps_since_action.shape[0]):
-        if is_over and memory.steps_since_action[agent] >= 0:
-            for module in range(learner.bases.shape[0]):
-                learn(learner, memory, agent, module, 0.0)
-        memory.steps_since_action[agent] = -1
+# After a terminal state the message is zero, as in Algorithm 6.3.
+rules.end_episode.register(Messages)(end_episode)

@@ -16,6 +16,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
+from hose_learning.learners import round_robin
 from hose_learning.learners.round_robin import learn
 from hose_learning.modules import Module
 from hose_learning.policies import compute_best, find_lowest_bit
@@ -141,11 +142,7 @@ def accumulate(
 @jitable
 def end_episode(rule: Risk, learner: Learner, memory: Memory, is_over: bool) -> None:
     """After a terminal state nothing follows; xi moves towards the bound of the risk."""
-    for agent in range(memory.steps_since_action.shape[0]):
-        if is_over and memory.steps_since_action[agent] >= 0:
-            for module in range(2):
-                learn(learner, memory, agent, module, 0.0)
-        memory.steps_since_action[agent] = -1
+    round_robin.end_episode(rule, learner, memory, is_over)
     risk = memory.own.risk
     risk[0] += (risk[1] - risk[0]) / AVERAGED_EPISODES
     if memory.counters[EPISODES] >= rule.settle_episodes:

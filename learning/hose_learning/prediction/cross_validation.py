@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy.stats import t as student
@@ -20,8 +20,7 @@ MEASURES = ("accuracy", "sensitivity", "specificity", "npv", "ppv")
 """Names of the measures; npv and ppv are the negative and positive predictive value."""
 
 
-@dataclass(frozen=True)
-class Confusion:
+class Confusion(NamedTuple):
     """How many instances of each class were taken for which.
 
     Attributes:
@@ -36,39 +35,21 @@ class Confusion:
     false_positives: int
     false_negatives: int
 
-    @property
-    def accuracy(self) -> float:
-        """Share of all instances that are taken for what they are."""
-        right = self.true_positives + self.true_negatives
-        return _divide(right, right + self.false_positives + self.false_negatives)
-
-    @property
-    def sensitivity(self) -> float:
-        """Share of the safe instances that are taken for safe."""
-        return _divide(self.true_positives, self.true_positives + self.false_negatives)
-
-    @property
-    def specificity(self) -> float:
-        """Share of the undesired instances that are taken for undesired."""
-        return _divide(self.true_negatives, self.true_negatives + self.false_positives)
-
-    @property
-    def npv(self) -> float:
-        """Share of those taken for undesired that are; NaN where none is."""
-        return _divide(self.true_negatives, self.true_negatives + self.false_negatives)
-
-    @property
-    def ppv(self) -> float:
-        """Share of those taken for safe that are; NaN where none is."""
-        return _divide(self.true_positives, self.true_positives + self.false_positives)
-
     def measure(self) -> Floats:
-        """Returns all measures in the order of `MEASURES` (5,)."""
-        return np.array([getattr(self, name) for name in MEASURES])
+        """Returns all measures in the order of `MEASURES` (5,), NaN where nothing is counted.
 
-
-def _divide(part: int, whole: int) -> float:
-    return part / whole if whole else math.nan
+        They are shares: of all instances, those taken for what they are; of the safe and of the
+        undesired, those taken for it; of those taken for undesired and for safe, those that are.
+        """
+        safe, undesired, missed, false_alarms = self
+        shares = (
+            (safe + undesired, sum(self)),
+            (safe, safe + false_alarms),
+            (undesired, undesired + missed),
+            (undesired, undesired + false_alarms),
+            (safe, safe + missed),
+        )
+        return np.array([part / whole if whole else math.nan for part, whole in shares])
 
 
 def count_confusion(undesired: Bools, predicted: Bools) -> Confusion:

@@ -340,3 +340,20 @@ def test_wrong_run_folders(tmp_path):
     (tmp_path / CHECKPOINT).write_bytes(b"nothing")
     with pytest.raises(InputError, match="hash differs"):
         folder.open()
+
+
+def test_a_checkpoint_with_the_names_of_before_is_read(tmp_path):
+    task = make_task("corridor")
+    settings = catalog.make_settings("d-rr-ql", task)
+    training = Training(task, "d-rr-ql", settings, np.random.default_rng(3), compiled=False)
+    training.advance(moves=40)
+    names = {new: old for old, new in run_folder.OLD_NAMES.items()}
+    arrays = run_folder.flatten(training.memory)
+    path = tmp_path / "last.npz"
+    np.savez_compressed(path, **{names.get(name, name): a for name, a in arrays.items()})
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    (tmp_path / "manifest.json").write_text(json.dumps({"last.npz": [digest]}))
+    again = run_folder.flatten(run_folder.load_memory(path, training.memory))
+    assert {name: a.tobytes() for name, a in again.items()} == {
+        name: a.tobytes() for name, a in arrays.items()
+    }

@@ -16,8 +16,12 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.mdp.partially_constrained import Propositions, Violation
-    from hose_learning.mdp.task_pairs import Pair, WrittenPair
+    from hose_learning.mdp.partially_constrained import (
+        Pair,
+        PcmViolation,
+        Propositions,
+        WrittenPair,
+    )
 
 
 @dataclass(frozen=True)
@@ -56,10 +60,13 @@ class Args:
 def run(args: Args) -> int:
     """Checks a pair; 1 if it is not a PCM."""
     import numpy as np
-    from hose_learning.mdp.partially_constrained import compute_propositions, find_violations
-    from hose_learning.mdp.task_pairs import make_tasks, write_pair
+    from hose_learning.mdp.partially_constrained import (
+        compute_propositions,
+        find_violations,
+        make_tasks,
+        write_pair,
+    )
 
-    from hose_mj.cli.check_pcm_picture import draw_values
     from hose_mj.recording.files import write_atomically
 
     if args.list:
@@ -95,7 +102,7 @@ def choose_pair(args: Args) -> Pair:
     Raises:
         InputError: an unknown example, an example with tasks or options, or tasks left out.
     """
-    from hose_learning.mdp.task_pairs import PAIRS, Pair
+    from hose_learning.mdp.partially_constrained import PAIRS, Pair
 
     if args.example is not None:
         if args.example not in PAIRS:
@@ -111,7 +118,7 @@ def choose_pair(args: Args) -> Pair:
     return Pair("", args.source, args.target, options[""], options["source"], options["target"])
 
 
-def make_checks(violations: list[Violation], propositions: Propositions | None) -> list[Check]:
+def make_checks(violations: list[PcmViolation], propositions: Propositions | None) -> list[Check]:
     """Makes the checks: four properties, and for a PCM the two propositions."""
     from hose_learning.mdp.partially_constrained import PROPERTIES
 
@@ -130,7 +137,10 @@ def make_checks(violations: list[Violation], propositions: Propositions | None) 
 
 
 def make_results(
-    pair: Pair, written: WrittenPair, violations: list[Violation], propositions: Propositions | None
+    pair: Pair,
+    written: WrittenPair,
+    violations: list[PcmViolation],
+    propositions: Propositions | None,
 ) -> dict[str, Any]:
     """Returns the document's own entries."""
     actions, names = written.target.model.actions, written.target.model.names
@@ -164,7 +174,7 @@ def make_results(
 
 def list_pairs(args: Args) -> int:
     """Prints the ready pairs."""
-    from hose_learning.mdp.task_pairs import PAIRS
+    from hose_learning.mdp.partially_constrained import PAIRS
 
     if args.json:
         pairs = [{"name": name, **asdict(pair)} for name, pair in PAIRS.items()]
@@ -177,7 +187,10 @@ def list_pairs(args: Args) -> int:
 
 
 def _summarize(
-    pair: Pair, written: WrittenPair, violations: list[Violation], propositions: Propositions | None
+    pair: Pair,
+    written: WrittenPair,
+    violations: list[PcmViolation],
+    propositions: Propositions | None,
 ) -> None:
     sizes = (written.source.model.n_states, written.target.model.n_states)
     print(f"source {pair.source}: {sizes[0]:,} states; target {pair.target}: {sizes[1]:,} states")
@@ -187,3 +200,26 @@ def _summarize(
     if propositions is not None and propositions.shortfall > 0.0:
         state = written.target.model.names[propositions.shortfall_state]
         print(f"greedy on the transferred values is {propositions.shortfall:.4g} short at {state}")
+
+
+def draw_values(title: str, propositions: Propositions) -> bytes:
+    """Returns the PNG: the bound of each target state and what greedy transfer gets, over V_t*."""
+    import numpy as np
+
+    from hose_mj.recording.palette import OTHERS, format_hex
+    from hose_mj.recording.plots.style import SOFT, add_legend, encode_png, make_axes
+
+    best = propositions.best
+    with make_axes(f"Values that a PCM transfers: {title}", (6.4, 4.6)) as (figure, axes):
+        ends = np.array([min(best.min(), propositions.greedy.min()), propositions.bounds.max()])
+        axes.plot(ends, ends, color=SOFT, lw=0.8, ls=(0, (4, 3)), label="$V_t^*$ itself")
+        for values, name, marker, place in (
+            (propositions.bounds, "$\\max_a Q_s^*([s], a)$: never below", "o", 1),
+            (propositions.greedy, "greedy on the transferred values: never above", "x", 0),
+        ):
+            color = format_hex(OTHERS[place])
+            axes.plot(best, values, ls="", marker=marker, ms=5.0, mfc="none", c=color, label=name)
+        axes.set_xlabel("best value of a target state, $V_t^*(s)$")
+        axes.set_ylabel("value")
+        add_legend(figure, axes.get_legend_handles_labels()[0], columns=2)
+        return encode_png(figure)

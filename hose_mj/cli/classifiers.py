@@ -15,7 +15,7 @@ import tyro
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.prediction.offline import Plan, Study
+    from hose_learning.prediction.offline import OfflinePlan, Study
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def run(args: Args) -> int:
     """Runs the experiment; 1 if a check failed."""
     from hose_learning.prediction.attributes import Encoding
     from hose_learning.prediction.offline import (
-        Plan,
+        OfflinePlan,
         list_checks,
         list_records,
         run_study,
@@ -67,7 +67,7 @@ def run(args: Args) -> int:
     begun = time.perf_counter()
     if args.out is not None:
         make_folder(args.out)
-    plan = Plan(
+    plan = OfflinePlan(
         task=args.task,
         cycles=args.cycles,
         logs=args.logs,
@@ -109,7 +109,7 @@ def describe_log(study: Study) -> list[dict[str, object]]:
 
 
 @contextmanager
-def show_progress(plan: Plan) -> Iterator[Callable[[], object]]:
+def show_progress(plan: OfflinePlan) -> Iterator[Callable[[], object]]:
     """A bar on stderr over all folds; nothing where that is no terminal."""
     from hose_learning.prediction.offline import count_folds
     from rich.console import Console

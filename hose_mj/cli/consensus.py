@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from hose_mj.checks import Check
 from hose_mj.cli.check_table import print_checks
@@ -13,13 +13,13 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.consensus.clocks import ConsensusSettings, Record
+    from hose_learning.consensus.clocks import ConsensusSettings
+    from hose_learning.consensus.trial import ConsensusTrial
 
 LOSSES = (0.0, 0.1, 0.5)
 """Shares of lost messages that are always tried, beside the one asked for."""
 LARGEST_SPREAD = 0.05
 """Disagreement that counts as agreement, in turns."""
-SETTLING_TURNS, MEASURED_TURNS = 10, 40
 SCATTER = 1.2
 """What chance may add to a disagreement measured over so many turns."""
 
@@ -59,25 +59,9 @@ class Args:
     """Seed of everything random."""
 
 
-class Trial(NamedTuple):
-    """One loss: clocks alone, agents that act by them, and what was measured.
-
-    Attributes:
-        settings: the network.
-        clocks: clocks that run alone.
-        play: agents that act.
-        record: numbers for the document.
-    """
-
-    settings: ConsensusSettings
-    clocks: Record
-    play: Record
-    record: dict[str, float]
-
-
 def run(args: Args) -> int:
     """Runs the trials; 1 if a check failed."""
-    from hose_learning.consensus.pictures import draw_consensus
+    from hose_learning.consensus.trial import draw_consensus, run_trial
 
     from hose_mj.recording.files import write_atomically
 
@@ -119,38 +103,7 @@ def make_settings(args: Args) -> ConsensusSettings:
     )
 
 
-def run_trial(settings: ConsensusSettings, seed: int) -> Trial:
-    """Simulates one loss, twice: clocks alone, and agents that act by them."""
-    import numpy as np
-    from hose_learning.consensus import clocks as consensus
-    from hose_learning.consensus import consensus_measures
-    from hose_learning.consensus import second_moments as consensus_moments
-
-    alone, playing = np.random.default_rng(seed).spawn(2)
-    settling = SETTLING_TURNS * settings.rounds
-    n_rounds = settling + MEASURED_TURNS * settings.rounds
-    clocks = consensus.run_clocks(settings, alone, n_rounds)
-    play = consensus.simulate(settings, playing)
-    leads = consensus_measures.compute_leads(play)
-    lead = float(leads.max()) if len(leads) else 1.0  # clocks so coarse that they skip all turns
-    reached = (play.clocks.max(axis=1) >= settings.first_turn).argmax()
-    duration = (len(play.times) - reached) * settings.round_time  # the last round is over too
-    record = {
-        "loss": settings.loss,
-        "first_spread": float(play.spreads[0]),
-        "agreed_spread": float(play.spreads[reached]),
-        "disagreement": float(np.sqrt(clocks.clocks[settling:].var(axis=1).mean())),
-        "exact_disagreement": consensus_moments.compute_disagreement(settings, clocks.rates),
-        "actions": len(play.actions),
-        "disorder": consensus_measures.count_disorder(play.actions, settings),
-        "overlaps": consensus_measures.count_overlaps(play.actions),
-        "longest_safe_action": consensus_measures.compute_longest_action(lead, settings.drift),
-        "turns_per_time": settings.n_turns / float(duration),
-    }
-    return Trial(settings, clocks, play, record)
-
-
-def make_checks(trial: Trial) -> list[Check]:
+def make_checks(trial: ConsensusTrial) -> list[Check]:
     """Makes the checks of one loss."""
     found = trial.record
     name = f"loss {100.0 * trial.settings.loss:g} %: "
@@ -169,7 +122,7 @@ def make_checks(trial: Trial) -> list[Check]:
     ]
 
 
-def _summarize(trials: list[Trial]) -> None:
+def _summarize(trials: list[ConsensusTrial]) -> None:
     from rich.console import Console
     from rich.table import Table
 

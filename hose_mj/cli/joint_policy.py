@@ -52,8 +52,12 @@ class Args:
 def run(args: Args) -> int:
     """Learns and composes; 1 if the joint moves do not reach the goal, or not the shortest way."""
     import numpy as np
-    from hose_learning.mdp.joint_policy import count_fewest_moves, estimate, play_composed
-    from hose_learning.mdp.q_values import make_evaluate
+    from hose_learning.mdp.joint_policy import (
+        count_fewest_moves,
+        estimate,
+        make_evaluate,
+        play_composed,
+    )
 
     from hose_mj.checks import Check
     from hose_mj.tasks.exact import enumerate_joint
@@ -99,7 +103,7 @@ def _check(args: Args) -> None:
         if getattr(args, name) < least:
             raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
     if not catalog.find_learner(args.learner).composes:
-        known = [id for id, entry in catalog.LEARNERS.items() if entry.composes]
+        known = [id for id, entry in catalog.list_learners().items() if entry.composes]
         raise InputError("learner", args.learner, "one of " + ", ".join(known))
 
 

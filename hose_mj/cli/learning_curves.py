@@ -114,7 +114,7 @@ def check_arguments(args: Args) -> None:
     if args.seed < 0:
         raise InputError("seed", args.seed, "a whole number, at least 0")
     for name, given, known in (
-        ("learners", args.learners, list(catalog.LEARNERS)),
+        ("learners", args.learners, list(catalog.list_learners())),
         ("measures", args.measures, list(MEASURES)),
     ):
         valid = "different names out of " + ", ".join(known)

@@ -255,7 +255,7 @@ def _list() -> None:
     console = Console()
     for title, lines in (
         ("Tasks", [(id, "", entry.description) for id, entry in TASKS.items()]),
-        ("Learners", [(id, e.section, e.description) for id, e in catalog.LEARNERS.items()]),
+        ("Learners", [(id, e.section, e.description) for id, e in catalog.list_learners().items()]),
     ):
         table = Table(title=title, box=None, title_justify="left", show_header=False)
         for line in lines:

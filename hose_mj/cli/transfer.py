@@ -15,7 +15,7 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.transfer.trial import Outcome
+    from hose_learning.transfer import TransferOutcome
 
 
 @dataclass(frozen=True)
@@ -85,15 +85,15 @@ def _check(args: Args) -> None:
         raise InputError("exchange", args.exchange, "numbers above 0, at least one")
 
 
-def _run_all(args: Args) -> list[Outcome]:
+def _run_all(args: Args) -> list[TransferOutcome]:
     """Runs one configuration after the other, each with a generator of its own."""
     import numpy as np
-    from hose_learning.transfer.trial import Plan, run_trial
+    from hose_learning.transfer import TransferPlan, run_trial
 
     from hose_mj.cli.progress import show_progress
     from hose_mj.jit import compile_notice
 
-    plan = Plan(
+    plan = TransferPlan(
         source=args.source,
         target=args.target,
         source_options=parse_options(args.source_set),
@@ -113,7 +113,7 @@ def _run_all(args: Args) -> list[Outcome]:
     return outcomes
 
 
-def summarize(outcomes: list[Outcome], exchange: tuple[float, ...]) -> list[dict[str, Any]]:
+def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> list[dict[str, Any]]:
     """Counts the configurations whose goal was reached, in all ways there are, with intervals.
 
     One row for each greedy episode (the goal was reached in it for the first time), one for any of
@@ -121,7 +121,7 @@ def summarize(outcomes: list[Outcome], exchange: tuple[float, ...]) -> list[dict
     """
     from hose_learning.study.statistics import compute_rate_interval
 
-    def first(outcome: Outcome) -> int | None:
+    def first(outcome: TransferOutcome) -> int | None:
         return outcome.reached.index(True) if any(outcome.reached) else None
 
     n_episodes = max(len(outcome.reached) for outcome in outcomes)
@@ -145,7 +145,7 @@ def summarize(outcomes: list[Outcome], exchange: tuple[float, ...]) -> list[dict
     ]
 
 
-def _print(args: Args, outcomes: list[Outcome], rows: list[dict[str, Any]]) -> None:
+def _print(args: Args, outcomes: list[TransferOutcome], rows: list[dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hose_learning import rules
 from hose_learning.loop import begin_episode, choose, see
-from hose_learning.records import Memory
+from hose_learning.records import Learner, Memory
 from hose_mj.jit import bitwise, jitable
 from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import STEPS, TURN, Integers, dispatched
@@ -32,7 +32,7 @@ def _copy(value: Any) -> Any:
 
 
 @jitable
-def compose(task, learner, memory, start):  # type: ignore[no-untyped-def]
+def compose(task: Any, learner: Learner, memory: Memory, start: Integers) -> None:
     """Writes the joint move that the agents agree on, one after the other (section 6.4).
 
     Agent i chooses greedily in the state that its predecessors expect to hand on. In a
@@ -87,7 +87,7 @@ def play(manner: Any, task: Any, learner: Any, memory: Any) -> int:
 
 @play.register(Turns)
 @jitable
-def play_turn(manner, task, learner, memory):  # type: ignore[no-untyped-def]
+def play_turn(manner: Any, task: Any, learner: Learner, memory: Memory) -> int:
     """The agent whose turn it is moves."""
     agent = memory.state[TURN]
     allowed = see(task, learner, memory, agent)
@@ -97,24 +97,32 @@ def play_turn(manner, task, learner, memory):  # type: ignore[no-untyped-def]
 
 @play.register(Joint)
 @jitable
-def play_joint(manner, task, learner, memory):  # type: ignore[no-untyped-def]
+def play_joint(manner: Any, task: Any, learner: Learner, memory: Memory) -> int:
     """All agents move at once."""
     for agent in range(memory.actions.shape[0]):
         memory.allowed[agent] = see(task, learner, memory, agent)
     rules.choose_joint(learner.rule, task, learner, memory, False)
-    return kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
+    return kernels.apply_joint(task, memory.state, memory.actions, memory.caused_events)
 
 
 @play.register(Composed)
 @jitable
-def play_composed(manner, task, learner, memory):  # type: ignore[no-untyped-def]
+def play_composed(manner: Any, task: Any, learner: Learner, memory: Memory) -> int:
     """All agents make the joint move that they agree on."""
     compose(task, learner, memory, manner.start)
-    return kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
+    return kernels.apply_joint(task, memory.state, memory.actions, memory.caused_events)
 
 
 @bitwise
-def run_tests(manner, task, learner, memory, n_episodes, max_moves, results):  # type: ignore[no-untyped-def]
+def run_tests(
+    manner: Any,
+    task: Any,
+    learner: Learner,
+    memory: Memory,
+    n_episodes: int,
+    max_moves: int,
+    results: Integers,
+) -> None:
     """Plays greedy episodes.
 
     Args:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hose_learning.experience_kernels import Rows, fill_rows
+from hose_learning.loop import Rows, fill_rows
 from hose_mj.errors import InputError
 from hose_mj.jit import compile_notice
 from hose_mj.recording.files import write_atomically
@@ -30,7 +30,7 @@ _NAMES = ("variables", "agent_names", "action_names", "event_names", "reward_nam
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Experience:
-    """A log of n moves. The arrays are those of `experience_kernels.Rows`.
+    """A log of n moves. The arrays are those of `hose_learning.loop.Rows`.
 
     Attributes:
         task: id of the task.
@@ -115,7 +115,7 @@ def record_experience(task: Task, n_moves: int, generator: np.random.Generator) 
 
 
 def make_rows(task: Task, n_moves: int) -> Rows:
-    """Makes rows of zeros, to be written by `experience_kernels.fill_rows`."""
+    """Makes rows of zeros, to be written by `hose_learning.loop.fill_rows`."""
     shape = (n_moves, len(task.variables))
     return Rows(
         values=np.zeros(shape, np.int64),

@@ -1,5 +1,7 @@
 """One loop for each schedule: agents that move in turns (or a single one), and jointly.
 
+Beside them stand what logs moves at random, and the vetoes of a loop by themselves.
+
 Compiled for compiled tasks; the same source, `run_turns.py_func` and `run_joint.py_func`, runs any
 other. Both stop after a number of moves or episodes, when the log is full, or when a table is about
 to be; calling them again goes on exactly where they stopped.
@@ -7,19 +9,32 @@ to be; calling them again goes on exactly where they stopped.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from hose_learning import rules
-from hose_learning.mediators import find_above_thresholds
-from hose_learning.policies import GREEDY, draw_allowed, draw_soft_max, find_best
-from hose_learning.records import EPISODES, EPSILON, FRESH, MOVES, RETURN, SUCCESSES, TEMPERATURE
+from hose_learning.mediators import compute_above_thresholds
+from hose_learning.policies import GREEDY, compute_best, draw_allowed, draw_soft_max
+from hose_learning.records import (
+    EPISODES,
+    EPSILON,
+    FRESH,
+    MOVES,
+    RETURN,
+    SUCCESSES,
+    TEMPERATURE,
+    Learner,
+    Log,
+    Memory,
+)
 from hose_learning.tables import claim, count_free, find
-from hose_mj.jit import bitwise, jitable
+from hose_mj.jit import bitwise, compiled, jitable
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import STEPS, TURN
-from hose_mj.tasks.stream import draw_unit
+from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
+from hose_mj.tasks.stream import Stream, draw_unit
 
 
 @jitable
-def has_room(learner, memory, log, n_moves):  # type: ignore[no-untyped-def]
+def has_room(learner: Learner, memory: Memory, log: Log, n_moves: int) -> bool:
     """Whether tables and log have room for that many more moves."""
     free = min(
         count_free(memory.table) // max(1, learner.bases.shape[0]),
@@ -30,7 +45,7 @@ def has_room(learner, memory, log, n_moves):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def see(task, learner, memory, agent):  # type: ignore[no-untyped-def]
+def see(task: Any, learner: Learner, memory: Memory, agent: int) -> int:
     """Lets an agent's modules look at the state; returns what it may do, as bits."""
     values = memory.values
     kernels.observe(task, memory.state, agent, values)
@@ -51,7 +66,7 @@ def see(task, learner, memory, agent):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def keep_keys(learner, memory, agent):  # type: ignore[no-untyped-def]
+def keep_keys(learner: Learner, memory: Memory, agent: int) -> None:
     """Keeps what the agent's modules see as what they saw at its last move."""
     for module in range(learner.bases.shape[0]):
         memory.last_keys[agent, module] = memory.keys[agent, module]
@@ -60,26 +75,28 @@ def keep_keys(learner, memory, agent):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def choose(task, learner, memory, agent, allowed, explores):  # type: ignore[no-untyped-def]
+def choose(
+    task: Any, learner: Learner, memory: Memory, agent: int, allowed: int, explores: bool
+) -> int:
     """Chooses the agent's action among the allowed, epsilon-greedily (eqs 4.4, 5.2) or soft max."""
     if learner.has_thresholds:
-        allowed &= find_above_thresholds(learner, memory, agent, memory.scores.shape[0])
-    allowed = rules.restrict(learner.rule, memory, agent, allowed)
+        allowed &= compute_above_thresholds(learner, memory, agent, memory.scores.shape[0])
+    allowed = rules.mask(learner.rule, memory, agent, allowed)
     if allowed == 0:
         if learner.fallback >= 0:
             return learner.fallback
         allowed = kernels.mask(task, memory.state, agent)
     if explores and learner.policy == GREEDY and draw_unit(memory.stream) < memory.numbers[EPSILON]:
         return draw_allowed(allowed, memory.stream)
-    rules.weigh(learner.rule, learner, memory, agent)
+    rules.score(learner.rule, learner, memory, agent)
     if explores and learner.policy != GREEDY and memory.numbers[TEMPERATURE] > 0.0:
         temperature = memory.numbers[TEMPERATURE]
         return draw_soft_max(memory.scores, allowed, temperature, memory.stream)
-    return draw_allowed(find_best(memory.scores, allowed), memory.stream)
+    return draw_allowed(compute_best(memory.scores, allowed), memory.stream)
 
 
 @jitable
-def veto(learner, memory, agent, events):  # type: ignore[no-untyped-def]
+def veto(learner: Learner, memory: Memory, agent: int, events: int) -> None:
     """Vetoes the agent's last action where the events concern its modules (section 5.3)."""
     for module in range(learner.veto_bases.shape[0]):
         concerned = learner.veto_actions[module] >> memory.actions[agent] & 1
@@ -89,16 +106,16 @@ def veto(learner, memory, agent, events):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def begin_episode(task, memory):  # type: ignore[no-untyped-def]
+def begin_episode(task: Any, memory: Memory) -> None:
     """Resets the task; nobody has moved yet."""
     kernels.reset(task, memory.state, memory.starts)
-    memory.waited[:] = -1
+    memory.steps_since_action[:] = -1
     memory.numbers[RETURN] = 0.0
     memory.counters[FRESH] = 0
 
 
 @jitable
-def end_episode(task, learner, memory, log, events):  # type: ignore[no-untyped-def]
+def log_episode(task: Any, learner: Learner, memory: Memory, log: Log, events: int) -> None:
     """Logs an episode that ended with these events, and lets epsilon fall."""
     success = events & task.success != 0
     row = log.used[0]
@@ -115,15 +132,17 @@ def end_episode(task, learner, memory, log, events):  # type: ignore[no-untyped-
 
 
 @jitable
-def count_events(task, learner, memory, events):  # type: ignore[no-untyped-def]
+def count_events(task: Any, learner: Learner, memory: Memory, events: int) -> None:
     """Counts the events of one mover and what they are worth."""
-    memory.numbers[RETURN] += learner.worth[events]
+    memory.numbers[RETURN] += learner.return_of_event[events]
     for event in range(memory.event_counts.shape[0]):
         memory.event_counts[event] += events >> event & 1
 
 
 @bitwise
-def run_turns(task, learner, memory, log, max_moves, max_episodes):  # type: ignore[no-untyped-def]
+def run_turns(
+    task: Any, learner: Learner, memory: Memory, log: Log, max_moves: int, max_episodes: int
+) -> int:
     """Trains agents that move one after the other.
 
     Args:
@@ -146,49 +165,51 @@ def run_turns(task, learner, memory, log, max_moves, max_episodes):  # type: ign
             begin_episode(task, memory)
         agent = memory.state[TURN]
         allowed = see(task, learner, memory, agent)
-        rules.meet(learner.rule, learner, memory, agent)
+        rules.on_observe(learner.rule, learner, memory, agent)
         action = choose(task, learner, memory, agent, allowed, True)
         events = kernels.apply(task, memory.state, agent, action)
         moves += 1
         memory.counters[MOVES] += 1
         memory.actions[agent] = action
-        memory.waited[agent] = 0
+        memory.steps_since_action[agent] = 0
         keep_keys(learner, memory, agent)
         if events:
             count_events(task, learner, memory, events)
             if learner.shares_vetoes:
                 for other in range(memory.actions.shape[0]):
-                    if memory.waited[other] >= 0:
+                    if memory.steps_since_action[other] >= 0:
                         veto(learner, memory, other, events)
             else:
                 veto(learner, memory, agent, events)
-        rules.gather(learner.rule, learner, memory, agent, action, events)
+        rules.accumulate(learner.rule, learner, memory, agent, action, events)
         is_over = kernels.is_over(task, events)
         if is_over or kernels.is_cut_off(task, memory.state):
             if not is_over:  # one agent's cycle is complete all the same
                 agent = memory.state[TURN]
                 see(task, learner, memory, agent)
-                rules.meet(learner.rule, learner, memory, agent)
-                memory.waited[agent] = -1
-            rules.finish(learner.rule, learner, memory, is_over)
-            end_episode(task, learner, memory, log, events)
+                rules.on_observe(learner.rule, learner, memory, agent)
+                memory.steps_since_action[agent] = -1
+            rules.end_episode(learner.rule, learner, memory, is_over)
+            log_episode(task, learner, memory, log, events)
     return moves
 
 
 @jitable
-def gather_joint(learner, memory):  # type: ignore[no-untyped-def]
+def accumulate_joint(learner: Learner, memory: Memory) -> None:
     """Writes what each agent's modules are rewarded with for a joint move."""
     memory.rewards[:] = 0.0
     n_agents = memory.actions.shape[0]
     for agent in range(n_agents):
         for mover in range(n_agents):
             for module in range(learner.bases.shape[0]):
-                reward = learner.rewards[memory.charged[mover], int(mover == agent), module]
+                reward = learner.rewards[memory.caused_events[mover], int(mover == agent), module]
                 memory.rewards[agent, module] += reward
 
 
 @bitwise
-def run_joint(task, learner, memory, log, max_moves, max_episodes):  # type: ignore[no-untyped-def]
+def run_joint(
+    task: Any, learner: Learner, memory: Memory, log: Log, max_moves: int, max_episodes: int
+) -> int:
     """Trains agents that move at once; arguments and result are those of `run_turns`.
 
     A joint move counts as many moves as there are agents.
@@ -206,19 +227,84 @@ def run_joint(task, learner, memory, log, max_moves, max_episodes):  # type: ign
         rules.choose_joint(learner.rule, task, learner, memory, True)
         for agent in range(n_agents):
             keep_keys(learner, memory, agent)
-        events = kernels.apply_joint(task, memory.state, memory.actions, memory.charged)
+        events = kernels.apply_joint(task, memory.state, memory.actions, memory.caused_events)
         moves += n_agents
         memory.counters[MOVES] += n_agents
-        gather_joint(learner, memory)
+        accumulate_joint(learner, memory)
         for agent in range(n_agents):
-            if memory.charged[agent]:
-                count_events(task, learner, memory, memory.charged[agent])
-                veto(learner, memory, agent, memory.charged[agent])
+            if memory.caused_events[agent]:
+                count_events(task, learner, memory, memory.caused_events[agent])
+                veto(learner, memory, agent, memory.caused_events[agent])
         is_over = kernels.is_over(task, events)
         if not is_over:
             for agent in range(n_agents):
                 memory.allowed[agent] = see(task, learner, memory, agent)
         rules.learn_joint(learner.rule, learner, memory, is_over)
         if is_over or kernels.is_cut_off(task, memory.state):
-            end_episode(task, learner, memory, log, events)
+            log_episode(task, learner, memory, log, events)
     return moves
+
+
+class Rows(NamedTuple):
+    """One row for each move of an agent.
+
+    Attributes:
+        values: all variables as the mover saw them before the move (n, n_variables).
+        agents: who moved (n,).
+        actions: its action (n,).
+        events: what the move caused, as bits (n,).
+        rewards: what the mover got for it, by signal (n, n_signals).
+        next_values: what the mover saw right after its move, before anyone else's
+            (n, n_variables).
+    """
+
+    values: Integers
+    agents: Integers
+    actions: Integers
+    events: Integers
+    rewards: Floats
+    next_values: Integers
+
+
+@compiled
+def fill_rows(record: Any, state: Integers, stream: Stream, rows: Rows) -> None:
+    """Plays random available actions, agents in turn, until all rows are written.
+
+    Args:
+        record: the task's kernel record.
+        state: an initial state, advanced in place through as many episodes as it takes.
+        stream: random numbers for the actions and the resets.
+        rows: written in place.
+    """
+    for k in range(rows.agents.shape[0]):
+        agent = state[TURN]
+        kernels.observe(record, state, agent, rows.values[k])
+        action = draw_allowed(kernels.mask(record, state, agent), stream)
+        events = kernels.apply(record, state, agent, action)
+        rows.agents[k] = agent
+        rows.actions[k] = action
+        rows.events[k] = events
+        kernels.compute_rewards(record, events, agent, agent, rows.rewards[k])
+        kernels.observe(record, state, agent, rows.next_values[k])
+        if kernels.is_over(record, events) or kernels.is_cut_off(record, state):
+            kernels.reset(record, state, stream)
+
+
+@bitwise
+def compute_unvetoed(task: Any, learner: Learner, memory: Memory, agent: int) -> int:
+    """Returns, as bits, what nothing forbids the agent in `memory.state`; maybe nothing."""
+    allowed = see(task, learner, memory, agent)
+    if learner.has_thresholds:
+        allowed &= compute_above_thresholds(learner, memory, agent, memory.scores.shape[0])
+    return allowed
+
+
+@bitwise
+def add_vetoes(
+    task: Any, learner: Learner, memory: Memory, agent: int, action: int, events: int
+) -> None:
+    """Vetoes an action that the agent took in `memory.state`, where its events are a reason to."""
+    see(task, learner, memory, agent)
+    keep_keys(learner, memory, agent)
+    memory.actions[agent] = action
+    veto(learner, memory, agent, events)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+from hose_learning.records import Learner, Memory
 from hose_learning.tables import find
 from hose_mj.jit import jitable
+from hose_mj.tasks.kernels import Floats
 
 GREATEST_MASS, BEST_HAPPINESS, WORST_UNHAPPINESS = 0, 1, 2
 MEDIATORS = {
@@ -18,7 +20,7 @@ MEDIATORS = {
 
 
 @jitable
-def find_highest(rows, row):  # type: ignore[no-untyped-def]
+def compute_highest(rows: Floats, row: int) -> float:
     """Returns the highest value of a row."""
     highest = rows[row, 0]
     for k in range(1, rows.shape[1]):
@@ -27,7 +29,7 @@ def find_highest(rows, row):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def mediate(learner, memory, agent):  # type: ignore[no-untyped-def]
+def mediate(learner: Learner, memory: Memory, agent: int) -> None:
     """Writes the score of each action in the state that the agent's modules see."""
     scores, table = memory.scores, memory.table
     if learner.mediator == GREATEST_MASS:
@@ -46,7 +48,7 @@ def mediate(learner, memory, agent):  # type: ignore[no-untyped-def]
                 scores[action] = max(scores[action], table.rows[row, action])
         else:
             # arg min_a max_i (max_b Q_i(s_i, b) - Q_i(s_i, a)); scores hold the loss meanwhile.
-            highest = find_highest(table.rows, row)
+            highest = compute_highest(table.rows, row)
             for action in range(scores.shape[0]):
                 scores[action] = max(scores[action], highest - table.rows[row, action])
     if learner.mediator == WORST_UNHAPPINESS:
@@ -55,7 +57,7 @@ def mediate(learner, memory, agent):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def find_above_thresholds(learner, memory, agent, n_actions):  # type: ignore[no-untyped-def]
+def compute_above_thresholds(learner: Learner, memory: Memory, agent: int, n_actions: int) -> int:
     """Returns, as bits, the actions that no module values below its threshold (Definition 4)."""
     above = 0
     for action in range(n_actions):

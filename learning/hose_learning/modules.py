@@ -127,31 +127,21 @@ def make_module_rewards(task: Task, modules: Sequence[Module]) -> Floats:
     return rewards
 
 
-def make_event_masks(task: Task, modules: Sequence[Module]) -> Integers:
-    """Returns the events that each veto module answers to, as bits (n_modules,).
+def make_masks(thing: str, names: Sequence[str], chosen: Sequence[Sequence[str]]) -> Integers:
+    """Returns some names of each module as bits of one integer (n_modules,).
+
+    Args:
+        thing: what is named, for the message: an "event" that a veto module answers to, or an
+            "action" that it is about.
+        names: all of them; bit k stands for the k-th.
+        chosen: those of each module.
 
     Raises:
-        InputError: an unknown event.
+        InputError: an unknown name.
     """
-    masks = np.zeros(len(modules), np.int64)
-    for place, module in enumerate(modules):
-        for event in module.events:
-            if event not in task.events:
-                raise InputError("event", event, "one of " + ", ".join(task.events))
-            masks[place] |= 1 << task.events.index(event)
-    return masks
-
-
-def make_action_masks(task: Task, modules: Sequence[Module]) -> Integers:
-    """Returns the actions that each veto module is about, as bits (n_modules,).
-
-    Raises:
-        InputError: an unknown action.
-    """
-    masks = np.zeros(len(modules), np.int64)
-    for place, module in enumerate(modules):
-        for action in module.actions or task.action_names:
-            if action not in task.action_names:
-                raise InputError("action", action, "one of " + ", ".join(task.action_names))
-            masks[place] |= 1 << task.action_names.index(action)
+    masks = np.zeros(len(chosen), np.int64)
+    for place, name in ((place, name) for place, own in enumerate(chosen) for name in own):
+        if name not in names:
+            raise InputError(thing, name, "one of " + ", ".join(names))
+        masks[place] |= 1 << names.index(name)
     return masks

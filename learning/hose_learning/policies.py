@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 
 from hose_mj.jit import jitable
-from hose_mj.tasks.stream import draw_below, draw_unit
+from hose_mj.tasks.kernels import Floats
+from hose_mj.tasks.stream import Stream, draw_below, draw_unit
 
 GREEDY, SOFT_MAX = 0, 1
 """Epsilon-greedy (eq. 3.6) and soft max (eq. 3.5)."""
 
 
 @jitable
-def count_allowed(allowed):  # type: ignore[no-untyped-def]
+def count_allowed(allowed: int) -> int:
     """Returns how many actions are allowed."""
     count = 0
     while allowed:
@@ -22,7 +23,7 @@ def count_allowed(allowed):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def find_allowed(allowed, number):  # type: ignore[no-untyped-def]
+def find_allowed(allowed: int, number: int) -> int:
     """Returns the allowed action of that number, counted from 0."""
     for _ in range(number):
         allowed &= allowed - 1
@@ -33,20 +34,20 @@ def find_allowed(allowed, number):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def find_lowest_bit(bits):  # type: ignore[no-untyped-def]
+def find_lowest_bit(bits: int) -> int:
     """Returns the first of some actions given as bits."""
     return find_allowed(bits, 0)
 
 
 @jitable
-def draw_allowed(allowed, stream):  # type: ignore[no-untyped-def]
+def draw_allowed(allowed: int, stream: Stream) -> int:
     """Draws an allowed action, all equally likely."""
     count = count_allowed(allowed)
     return find_allowed(allowed, draw_below(stream, count) if count > 1 else 0)
 
 
 @jitable
-def find_best(scores, allowed):  # type: ignore[no-untyped-def]
+def compute_best(scores: Floats, allowed: int) -> int:
     """Returns, as bits, the allowed actions with the highest score (n_actions,).
 
     All of them where no score is a number, as after rewards beyond the range of floats.
@@ -64,7 +65,7 @@ def find_best(scores, allowed):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def draw_soft_max(scores, allowed, temperature, stream):  # type: ignore[no-untyped-def]
+def draw_soft_max(scores: Floats, allowed: int, temperature: float, stream: Stream) -> int:
     """Draws an allowed action with probability proportional to exp(score / temperature)."""
     highest = -math.inf
     for action in range(scores.shape[0]):

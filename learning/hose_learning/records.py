@@ -38,7 +38,7 @@ class Learner(NamedTuple):
         veto_events, veto_actions: the events that each answers to, the actions that it is about
             (n_vetoes,).
         shares_vetoes: whether an event vetoes the last move of every agent of the cycle.
-        worth: sum of all signals by events, each counted once (2^n_events,).
+        return_of_event: sum of all signals by events, each counted once (2^n_events,).
         mediator, policy: numbers of `hose_learning.mediators` and `hose_learning.policies`.
         fallback: action where everything is vetoed, or -1 for any.
         learning_rate: alpha, and by how much it decays: alpha / (1 + decay moves).
@@ -62,7 +62,7 @@ class Learner(NamedTuple):
     veto_events: Integers
     veto_actions: Integers
     shares_vetoes: bool
-    worth: Floats
+    return_of_event: Floats
     mediator: int
     policy: int
     fallback: int
@@ -88,8 +88,8 @@ class Memory(NamedTuple):
         actions: each agent's last action (n_agents,).
         allowed: what each agent may do, as bits (n_agents,).
         rewards: what each agent's modules got since its last move (n_agents, n_modules).
-        waited: moves since each agent's last one; -1 before its first (n_agents,).
-        charged: events that each agent caused in a joint move (n_agents,).
+        steps_since_action: moves since each agent's last one; -1 before its first (n_agents,).
+        caused_events: events that each agent caused in a joint move (n_agents,).
         numbers, counters: see the constants of this file.
         event_counts: how often each event has happened (n_events,).
         stream: random numbers of the choices (1,).
@@ -109,8 +109,8 @@ class Memory(NamedTuple):
     actions: Integers
     allowed: Integers
     rewards: Floats
-    waited: Integers
-    charged: Integers
+    steps_since_action: Integers
+    caused_events: Integers
     numbers: Floats
     counters: Integers
     event_counts: Integers

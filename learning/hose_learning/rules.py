@@ -6,12 +6,12 @@ runs unchanged as plain Python. A rule needs those of its schedule.
 
 When agents move in turns the loop calls, at each move,
 
-1. `meet`: the agent whose turn it is sees the state (`memory.keys[agent]`), so what its last move
-   waited for is complete;
-2. `gather`: it moved, and everyone notes the rewards;
-3. `finish`: the episode ended, so nothing more follows what still waits.
+1. `on_observe`: the agent whose turn it is sees the state (`memory.keys[agent]`), so what its last
+   move waited for is complete;
+2. `accumulate`: it moved, and everyone notes the rewards;
+3. `end_episode`: the episode ended, so nothing more follows what still waits.
 
-Before a choice it asks `restrict` and `weigh`, which have defaults.
+Before a choice it asks `mask` and `score`, which have defaults.
 
 When agents move at once it calls `choose_joint` and `learn_joint`.
 """
@@ -21,38 +21,39 @@ from __future__ import annotations
 from typing import Any
 
 from hose_learning.mediators import mediate
+from hose_learning.records import Learner, Memory
 from hose_mj.jit import jitable
 from hose_mj.tasks.kernels import dispatched
 
 
 @dispatched
-def meet(rule: Any, learner: Any, memory: Any, agent: int) -> None:
+def on_observe(rule: Any, learner: Any, memory: Any, agent: int) -> None:
     """Learns what can be learned once the agent sees the state in which it is to move."""
     raise NotImplementedError(type(rule).__name__)
 
 
 @dispatched
-def gather(rule: Any, learner: Any, memory: Any, agent: int, action: int, events: int) -> None:
+def accumulate(rule: Any, learner: Any, memory: Any, agent: int, action: int, events: int) -> None:
     """Notes a move of the agent and its events for the updates that wait for them."""
     raise NotImplementedError(type(rule).__name__)
 
 
 @dispatched
-def finish(rule: Any, learner: Any, memory: Any, is_over: bool) -> None:
+def end_episode(rule: Any, learner: Any, memory: Any, is_over: bool) -> None:
     """Learns from what still waits when an episode ends, or drops it where one is cut off."""
     raise NotImplementedError(type(rule).__name__)
 
 
 @dispatched
 @jitable
-def restrict(rule, memory, agent, allowed):  # type: ignore[no-untyped-def]
+def mask(rule: Any, memory: Memory, agent: int, allowed: int) -> int:
     """Returns, as bits, what the rule leaves of the allowed actions; by default all of them."""
     return allowed
 
 
 @dispatched
 @jitable
-def weigh(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def score(rule: Any, learner: Learner, memory: Memory, agent: int) -> None:
     """Writes `memory.scores`, which action choice goes by; by default what the mediator says."""
     mediate(learner, memory, agent)
 

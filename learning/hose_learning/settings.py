@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from hose_learning.mediators import MEDIATORS
-from hose_learning.modules import Module
+from hose_learning.modules import Kind, Module
 from hose_mj.errors import InputError
 
 POLICIES = ("epsilon-greedy", "soft-max")
@@ -88,9 +88,13 @@ class LearnerSettings:
             raise InputError("mediator", self.mediator, "one of " + ", ".join(MEDIATORS))
         if self.fallback not in FALLBACKS:
             raise InputError("fallback", self.fallback, "one of " + ", ".join(FALLBACKS))
-        if not any(module.kind == "value" for module in self.modules):
+        if not self.select("value"):
             names = [module.name for module in self.modules]
             raise InputError("modules", names, "at least one value module")
+
+    def select(self, kind: Kind) -> list[Module]:
+        """Returns the modules of a kind, in their order."""
+        return [module for module in self.modules if module.kind == kind]
 
 
 def check_range(name: str, value: object, low: float, high: float) -> None:

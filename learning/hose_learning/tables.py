@@ -57,7 +57,7 @@ def make_table(size: int, width: int, dtype: npt.DTypeLike, hashed: bool | None 
 
 
 @jitable
-def probe(keys, key):  # type: ignore[no-untyped-def]
+def probe(keys: Integers, key: int) -> int:
     """Returns the slot that holds the key, or the free one where it belongs."""
     last = keys.shape[0] - 1
     # Odd factors below 2^30, so that nothing overflows and plain Python finds the same slot.
@@ -70,7 +70,7 @@ def probe(keys, key):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def find(table, key):  # type: ignore[no-untyped-def]
+def find(table: Table, key: int) -> int:
     """Returns the row of a key to read from; the row of zeros if it was never written."""
     if table.keys.shape[0] == 0:
         return key
@@ -79,7 +79,7 @@ def find(table, key):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def claim(table, key):  # type: ignore[no-untyped-def]
+def claim(table: Table, key: int) -> int:
     """Returns the row of a key to write to, which is made if it is absent."""
     if table.keys.shape[0] == 0:
         return key
@@ -91,7 +91,7 @@ def claim(table, key):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def count_free(table):  # type: ignore[no-untyped-def]
+def count_free(table: Table) -> int:
     """Returns how many more keys may be claimed before the table has to grow."""
     if table.keys.shape[0] == 0:
         return 1 << 62
@@ -121,9 +121,25 @@ def grow(table: Table) -> Table:
 
 
 @compiled
-def _copy(table, grown):  # type: ignore[no-untyped-def]
+def _copy(table: Table, grown: Table) -> None:
     """Writes every row of one hashed table into another one."""
     for slot in range(table.keys.shape[0]):
         if table.keys[slot] != _FREE:
             row = claim(grown, table.keys[slot] - 1)
             grown.rows[row] = table.rows[slot]
+
+
+@compiled
+def write_rows(table: Table, keys: Integers, rows: Any, origins: Integers) -> None:
+    """Writes a row under each key.
+
+    Args:
+        table: the table, with room for all keys.
+        keys: where to write (n,).
+        rows: what to write from (n_rows, width).
+        origins: which row belongs under each key (n,).
+    """
+    for k in range(keys.shape[0]):
+        row = claim(table, keys[k])
+        for column in range(rows.shape[1]):
+            table.rows[row, column] = rows[origins[k], column]

@@ -1,7 +1,7 @@
 import json
 
 import pytest
-from hose_learning.mdp.task_pairs import PAIRS
+from hose_learning.mdp.partially_constrained import PAIRS
 
 from hose_mj.cli import main as cli
 

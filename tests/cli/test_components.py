@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
+from hose_learning import transfer as transfer_trial
 from hose_learning.study import training
-from hose_learning.transfer import trial as transfer_trial
 
 from hose_mj.cli import main as cli
 from hose_mj.cli import transfer
@@ -116,7 +116,7 @@ def test_transfer(capsys, uncompiled):
 
 def test_only_the_first_goal_of_a_configuration_counts():
     def make(*reached):
-        return transfer_trial.Outcome(("goal",), reached, 9, True, ((9, False),), 0, 0, 0)
+        return transfer_trial.TransferOutcome(("goal",), reached, 9, True, ((9, False),), 0, 0, 0)
 
     outcomes = [make(True, True), make(False, True), make(False, False)]
     counts = [row["reached"] for row in transfer.summarize(outcomes, (2.0,))]

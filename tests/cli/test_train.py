@@ -28,7 +28,7 @@ def uncompiled(monkeypatch):
             super().__init__(*arguments, **{**options, "compiled": False})
 
     monkeypatch.setattr(train, "Training", Plain)
-    monkeypatch.setattr("hose_learning.study.saving.Training", Plain)
+    monkeypatch.setattr("hose_learning.study.run_folder.Training", Plain)
     monkeypatch.setattr(train, "_compile", lambda training: None)
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from hose_learning.learners.catalog import LEARNERS, make_settings
+from hose_learning.learners.catalog import list_learners, make_settings
 from hose_learning.settings import Exploration
-from hose_learning.study.saving import describe, flatten, load_memory, remake, save_memory
+from hose_learning.study.run_folder import describe, flatten, load_memory, remake, save_memory
 from hose_learning.study.training import Training
 
 from hose_mj.errors import InputError
@@ -18,6 +18,7 @@ TASKS = {
     "taxi": {"passengers": (("R", "G"),), "step_limit": 60},
 }
 SEED = 11
+LEARNERS = list_learners()
 
 
 def make(id, name, **settings):

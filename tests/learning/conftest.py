@@ -9,7 +9,7 @@ from hose_learning import loop, tables
 from hose_learning.evaluation import make_probe
 from hose_learning.learners import catalog
 from hose_learning.settings import Exploration
-from hose_learning.study.saving import flatten
+from hose_learning.study.run_folder import flatten
 from hose_learning.study.training import Training
 from hose_learning.tables import find
 

@@ -31,7 +31,7 @@ def find_linked_code(text):
 def test_a_learner_has_a_row_in_the_index_with_its_file(id):
     row = next(line for line in read("README.md").splitlines() if f"[`{id}`]({id}.md)" in line)
     entry = LEARNERS[id]
-    assert f"](../../learning/learners/{entry.file}.py)" in row
+    assert f"](../../learning/hose_learning/learners/{entry.module.rpartition('.')[2]}.py)" in row
     assert ("| at once |" in row) == (entry.schedule == "joint")
     assert entry.section in row
 
@@ -41,7 +41,7 @@ def test_a_page_has_an_equation_and_quotes_the_code_as_it_is(id):
     text = read(f"{id}.md")
     assert text.startswith(f"# `{id}`")
     assert "$$" in text
-    assert f"{LEARNERS[id].file}.py)" in text or "round_robin.py)" in text
+    assert f"{LEARNERS[id].module.rpartition('.')[2]}.py)" in text or "round_robin.py)" in text
     quoted = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     source = {line.strip() for line in find_linked_code(text).splitlines()}
     lines = [line.strip() for block in quoted for line in block.splitlines() if line.strip()]

@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-from hose_learning.mediators import MEDIATORS, find_above_thresholds, find_highest, mediate
+from hose_learning.mediators import MEDIATORS, compute_above_thresholds, compute_highest, mediate
 from hose_learning.tables import make_table
 
 N_AGENTS, N_MODULES, N_STATES, N_ACTIONS = 2, 3, 5, 6
@@ -62,11 +62,11 @@ def test_thresholds_are_definition_4(parts):
     thresholds = np.array([-1.0, -np.inf, 0.0])
     learner = FakeLearner(np.zeros((N_MODULES, N_AGENTS)), 0, thresholds)
     for agent in range(N_AGENTS):
-        above = find_above_thresholds(learner, memory, agent, N_ACTIONS)
+        above = compute_above_thresholds(learner, memory, agent, N_ACTIONS)
         own = values[np.arange(N_MODULES), seen[agent]]
         safe = (own >= thresholds[:, None]).all(axis=0)
         assert [above >> a & 1 for a in range(N_ACTIONS)] == safe.tolist()
 
 
 def test_the_highest_of_a_row():
-    assert find_highest(np.array([[5.0, 9.0, -1.0], [-3.0, -2.0, -4.0]]), 1) == -2.0
+    assert compute_highest(np.array([[5.0, 9.0, -1.0], [-3.0, -2.0, -4.0]]), 1) == -2.0

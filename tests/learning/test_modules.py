@@ -6,9 +6,8 @@ from hose_learning import loop
 from hose_learning.learner import make_learner
 from hose_learning.modules import (
     Module,
-    make_action_masks,
     make_arrays,
-    make_event_masks,
+    make_masks,
     make_module_rewards,
 )
 from hose_learning.settings import LearnerSettings
@@ -77,8 +76,10 @@ def test_events_and_actions_as_bits(make_line):
         Module(name="a", variables=(), kind="veto", events=("out", "collision")),
         Module(name="b", variables=(), kind="veto", events=("goal",), actions=("up", "none")),
     ]
-    assert make_event_masks(task, modules).tolist() == [0b101, 0b1000]
-    assert make_action_masks(task, modules).tolist() == [0b11111, 0b10001]
+    assert make_masks("event", task.events, [m.events for m in modules]).tolist() == [0b101, 0b1000]
+    assert make_masks(
+        "action", task.action_names, [m.actions or task.action_names for m in modules]
+    ).tolist() == [0b11111, 0b10001]
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ from itertools import product
 import numpy as np
 import pytest
 from hose_learning.policies import (
+    compute_best,
     count_allowed,
     draw_allowed,
     draw_soft_max,
     find_allowed,
-    find_best,
     find_lowest_bit,
 )
 from scipy.stats import chisquare
@@ -45,7 +45,7 @@ def test_the_best_of_every_small_table(allowed):
     for scores in product((-np.inf, -1.0, 0.0, 2.5), repeat=N):
         best = max(scores[k] for k in list_bits(allowed))
         expected = [k for k in list_bits(allowed) if scores[k] == best]
-        assert list_bits(find_best(np.array(scores), allowed)) == expected
+        assert list_bits(compute_best(np.array(scores), allowed)) == expected
 
 
 @pytest.mark.parametrize("allowed", SETS)

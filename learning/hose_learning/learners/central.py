@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.round_robin import get_learning_rate
-from hose_learning.mediators import find_highest
+from hose_learning.mediators import compute_highest
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, get_options
 from hose_learning.tables import claim, find
@@ -34,9 +35,7 @@ class Last(NamedTuple):
     mover: Integers
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`."""
     get_options(settings, {})
     rule, own = Central(float(settings.discount)), Last(np.full(1, -1, np.int64))
@@ -44,7 +43,9 @@ def make(
 
 
 @jitable
-def learn_last(rule, learner, memory, module, following):  # type: ignore[no-untyped-def]
+def learn_last(
+    rule: Central, learner: Learner, memory: Memory, module: int, following: float
+) -> None:
     """Learns from the last move, of agent i, once the best value that follows is known.
 
     Q(s, a, i) <- (1 - alpha) Q(s, a, i) + alpha [r + gamma max_a' Q(s', a', j)]
@@ -57,29 +58,31 @@ def learn_last(rule, learner, memory, module, following):  # type: ignore[no-unt
     memory.table.rows[row, memory.actions[i]] = new
 
 
-@rules.meet.register(Central)
+@rules.on_observe.register(Central)
 @jitable
-def meet(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def on_observe(rule: Central, learner: Learner, memory: Memory, agent: int) -> None:
     """The state after the last move is known, and whose turn it is: agent j's."""
     if memory.own.mover[0] >= 0:
         for module in range(learner.bases.shape[0]):
             row = find(memory.table, memory.keys[agent, module])
-            highest = find_highest(memory.table.rows, row)
+            highest = compute_highest(memory.table.rows, row)
             learn_last(rule, learner, memory, module, highest)
 
 
-@rules.gather.register(Central)
+@rules.accumulate.register(Central)
 @jitable
-def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+def accumulate(
+    rule: Central, learner: Learner, memory: Memory, agent: int, action: int, events: int
+) -> None:
     """Notes the reward r of the move."""
     memory.own.mover[0] = agent
     for module in range(learner.bases.shape[0]):
         memory.rewards[agent, module] = learner.rewards[events, 1, module]
 
 
-@rules.finish.register(Central)
+@rules.end_episode.register(Central)
 @jitable
-def finish(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def end_episode(rule: Central, learner: Learner, memory: Memory, is_over: bool) -> None:
     """After a terminal state nothing follows."""
     if is_over:
         for module in range(learner.bases.shape[0]):

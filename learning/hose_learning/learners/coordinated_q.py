@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.coordination import (
     OPTIONS,
     add_to_edge,
@@ -20,9 +20,9 @@ from hose_learning.learners.coordination import (
     make_coordination,
     maximize_module,
 )
-from hose_learning.learners.graphs import Graph
 from hose_learning.learners.joint import sum_team_reward
 from hose_learning.learners.round_robin import get_learning_rate
+from hose_learning.learners.solvers import Graph
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, get_options
 from hose_mj.jit import jitable
@@ -36,9 +36,7 @@ class Coordinated(NamedTuple):
     graph: Graph
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -56,7 +54,7 @@ rules.choose_joint.register(Coordinated)(choose_on_graph)
 
 @rules.learn_joint.register(Coordinated)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: Coordinated, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Moves the values of all edges by the TD error of their sum.
 
     delta = r + gamma max_a' sum_ij Q_ij(s', a'_i, a'_j) - sum_ij Q_ij(s, a_i, a_j)

@@ -6,21 +6,27 @@ stands for the team's Q(s, a). An edge sees what the first of its two agents see
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from hose_learning.learners.graphs import Graph, make_graph, read_edges
 from hose_learning.learners.joint import allow_fallbacks, draw_each
-from hose_learning.learners.solvers import ELIMINATION, SOLVERS, maximize
+from hose_learning.learners.solvers import (
+    ELIMINATION,
+    SOLVERS,
+    Graph,
+    Scratch,
+    make_graph,
+    make_scratch,
+    maximize,
+    read_edges,
+)
 from hose_learning.mediators import GREATEST_MASS, MEDIATORS
-from hose_learning.records import EPSILON
+from hose_learning.records import EPSILON, Learner, Memory
 from hose_learning.settings import LearnerSettings, check_range
 from hose_learning.tables import claim, find
 from hose_mj.errors import InputError
 from hose_mj.jit import jitable
 from hose_mj.tasks.checks import check_choice
-from hose_mj.tasks.kernels import Floats, Integers
+from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.stream import draw_unit
 from hose_mj.tasks.task import Task
 
@@ -31,26 +37,6 @@ OPTIONS: dict[str, float | str] = {
 }
 """The edges: "chain" (neighbours along the hose), "complete", or pairs of agents as in "0-1 0-2";
 one of `solvers.SOLVERS`; starts of coordinate ascent, or most rounds of messages of max-plus."""
-
-
-class Scratch(NamedTuple):
-    """Work arrays.
-
-    Attributes:
-        values: of all functions of the graph, one after the other; the edges' payoffs first.
-        messages: of each edge, from either end, about the other's actions (n_edges, 2, n_actions).
-        scores, replies: of one agent's actions (n_actions,).
-        trial, best: joint actions (n_agents,).
-        errors: TD error of each agent (n_agents,).
-    """
-
-    values: Floats
-    messages: Floats
-    scores: Floats
-    replies: Floats
-    trial: Integers
-    best: Integers
-    errors: Floats
 
 
 def make_coordination(
@@ -72,20 +58,6 @@ def make_coordination(
     return graph, make_scratch(graph, n_actions)
 
 
-def make_scratch(graph: Graph, n_actions: int) -> Scratch:
-    """Makes the work arrays of a graph."""
-    n_edges, n_agents = len(graph.edges), len(graph.order)
-    return Scratch(
-        values=np.zeros(graph.sizes.sum()),
-        messages=np.zeros((n_edges, 2, n_actions)),
-        scores=np.zeros(n_actions),
-        replies=np.zeros(n_actions),
-        trial=np.zeros(n_agents, np.int64),
-        best=np.zeros(n_agents, np.int64),
-        errors=np.zeros(n_agents),
-    )
-
-
 def check_settings(task: Task, settings: LearnerSettings) -> None:
     """Raises `InputError` for settings that a sum over the edges of a graph does not allow."""
     if task.n_agents < 2:
@@ -103,7 +75,7 @@ def check_settings(task: Task, settings: LearnerSettings) -> None:
 
 
 @jitable
-def find_edge_key(graph, learner, keys, edge, module):  # type: ignore[no-untyped-def]
+def compute_edge_key(graph: Graph, learner: Learner, keys: Integers, edge: int, module: int) -> int:
     """Returns the key of what an edge sees: what its first agent sees, in the edge's own part."""
     agent = graph.edges[edge, 0]
     bases = learner.bases
@@ -112,24 +84,24 @@ def find_edge_key(graph, learner, keys, edge, module):  # type: ignore[no-untype
 
 
 @jitable
-def number_pair(graph, memory, edge):  # type: ignore[no-untyped-def]
+def number_pair(graph: Graph, memory: Memory, edge: int) -> int:
     """Returns the number of the actions a_i, a_j of an edge's agents; the second runs fastest."""
     first = memory.actions[graph.edges[edge, 0]]
     return first * memory.own.scores.shape[0] + memory.actions[graph.edges[edge, 1]]
 
 
 @jitable
-def add_payoffs(graph, learner, memory, module):  # type: ignore[no-untyped-def]
+def add_payoffs(graph: Graph, learner: Learner, memory: Memory, module: int) -> None:
     """Adds a module's values in the state that the agents see to the payoffs of all edges."""
     for edge in range(graph.edges.shape[0]):
-        key = find_edge_key(graph, learner, memory.keys, edge, module)
+        key = compute_edge_key(graph, learner, memory.keys, edge, module)
         row = find(memory.table, key)
         for pair in range(graph.sizes[edge]):
             memory.own.values[graph.offsets[edge] + pair] += memory.table.rows[row, pair]
 
 
 @jitable
-def maximize_module(graph, learner, memory, module):  # type: ignore[no-untyped-def]
+def maximize_module(graph: Graph, learner: Learner, memory: Memory, module: int) -> float:
     """Returns max_a' sum_ij Q_ij(s', a'_i, a'_j) of one module; `memory.own.best` is that a'."""
     memory.own.values[:] = 0.0
     add_payoffs(graph, learner, memory, module)
@@ -137,21 +109,23 @@ def maximize_module(graph, learner, memory, module):  # type: ignore[no-untyped-
 
 
 @jitable
-def get_edge_value(graph, learner, memory, edge, module):  # type: ignore[no-untyped-def]
+def get_edge_value(graph: Graph, learner: Learner, memory: Memory, edge: int, module: int) -> float:
     """Returns Q_ij(s, a_i, a_j) before the joint move."""
-    row = find(memory.table, find_edge_key(graph, learner, memory.last_keys, edge, module))
+    row = find(memory.table, compute_edge_key(graph, learner, memory.last_keys, edge, module))
     return memory.table.rows[row, number_pair(graph, memory, edge)]
 
 
 @jitable
-def add_to_edge(graph, learner, memory, edge, module, change):  # type: ignore[no-untyped-def]
+def add_to_edge(
+    graph: Graph, learner: Learner, memory: Memory, edge: int, module: int, change: float
+) -> None:
     """Adds to Q_ij(s, a_i, a_j) before the joint move."""
-    row = claim(memory.table, find_edge_key(graph, learner, memory.last_keys, edge, module))
+    row = claim(memory.table, compute_edge_key(graph, learner, memory.last_keys, edge, module))
     memory.table.rows[row, number_pair(graph, memory, edge)] += change
 
 
 @jitable
-def choose_on_graph(rule, task, learner, memory, explores):  # type: ignore[no-untyped-def]
+def choose_on_graph(rule: Any, task: Any, learner: Learner, memory: Memory, explores: bool) -> None:
     """Chooses a joint action epsilon-greedily, by the sum of all modules and edges (eq. 3.11)."""
     allow_fallbacks(task, learner, memory)
     if explores and draw_unit(memory.stream) < memory.numbers[EPSILON]:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.joint import (
     choose_each,
-    find_highest_value,
-    find_next_value,
+    compute_highest_value,
+    compute_next_value,
     get_last_value,
     set_last_value,
 )
@@ -46,9 +46,7 @@ class DistributedQ(NamedTuple):
     keeps_policy: bool
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -57,7 +55,7 @@ def make(
     """
     keeps_policy = get_options(settings, OPTIONS)["keeps_policy"]
     check_choice("keeps_policy", keeps_policy, ("no", "yes"))
-    n_values = sum(module.kind == "value" for module in settings.modules)
+    n_values = len(settings.select("value"))
     if keeps_policy == "yes" and (n_values > 1 or settings.exploration.policy == "soft-max"):
         valid = "'no' with several value modules or a soft max, which know no action to keep"
         raise InputError("keeps_policy", keeps_policy, valid)
@@ -69,9 +67,9 @@ def make(
 rules.choose_joint.register(DistributedQ)(choose_each)
 
 
-@rules.weigh.register(DistributedQ)
+@rules.score.register(DistributedQ)
 @jitable
-def weigh(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def score(rule: DistributedQ, learner: Learner, memory: Memory, agent: int) -> None:
     """Writes the scores of the actions; that of the kept one is above all others."""
     mediate(learner, memory, agent)
     if rule.keeps_policy:
@@ -83,7 +81,7 @@ def weigh(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
 
 @rules.learn_joint.register(DistributedQ)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: DistributedQ, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Raises the value of each agent's action to what it was worth now, if that is more.
 
     Q^i(s, a) <- max {Q^i(s, a), r + gamma max_a' Q^i(s', a')}
@@ -91,10 +89,10 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            following = find_next_value(memory, agent, module, is_over)
+            following = compute_next_value(memory, agent, module, is_over)
             td_target = memory.rewards[agent, module] + rule.discount * following
             if td_target > get_last_value(memory, agent, module, action):
-                highest = find_highest_value(memory, memory.last_keys[agent, module])
+                highest = compute_highest_value(memory, memory.last_keys[agent, module])
                 set_last_value(memory, agent, module, action, td_target)
                 if rule.keeps_policy and td_target > highest:
                     kept = memory.scores.shape[0]

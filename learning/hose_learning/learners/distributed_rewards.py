@@ -8,25 +8,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.joint import (
     choose_each,
-    find_next_value,
+    compute_next_value,
     get_last_value,
+    make_weights,
     set_last_value,
 )
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.records import Learner, Memory
-from hose_learning.settings import LearnerSettings, check_range, get_options
+from hose_learning.settings import LearnerSettings
 from hose_mj.jit import jitable
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.task import Task
-
-OPTIONS = {"neighbour_weight": 0.5}
-"""What an agent's neighbours weigh together; the rest is the agent's own weight."""
 
 
 class DistributedRewards(NamedTuple):
@@ -41,32 +39,14 @@ class DistributedRewards(NamedTuple):
     weights: Floats
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
-        InputError: a wrong option (see `OPTIONS`).
+        InputError: a wrong option (see `joint.NEIGHBOUR_OPTIONS`).
     """
     rule = DistributedRewards(float(settings.discount), make_weights(task.n_agents, settings))
     return make_learner(task, settings, rule, generator)
-
-
-def make_weights(n_agents: int, settings: LearnerSettings) -> Floats:
-    """Makes the weights f(i, j) of the agents i - 1, i, i + 1, which add up to 1 for each i.
-
-    Raises:
-        InputError: a wrong option (see `OPTIONS`).
-    """
-    weight = get_options(settings, OPTIONS)["neighbour_weight"]
-    check_range("neighbour_weight", weight, 0.0, 1.0)
-    weights = np.eye(n_agents)
-    if n_agents > 1:
-        are_neighbours = np.eye(n_agents, k=1) + np.eye(n_agents, k=-1)
-        shares = are_neighbours / are_neighbours.sum(axis=1, keepdims=True)
-        weights = (1.0 - float(weight)) * weights + float(weight) * shares
-    return weights
 
 
 rules.choose_joint.register(DistributedRewards)(choose_each)
@@ -74,7 +54,7 @@ rules.choose_joint.register(DistributedRewards)(choose_each)
 
 @rules.learn_joint.register(DistributedRewards)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: DistributedRewards, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Moves the value of each agent's action towards the neighbours' rewards and its own future.
 
     Q^i(s, a) <- (1 - alpha) Q^i(s, a) + alpha [sum_j f(i, j) r_j + gamma max_a' Q^i(s', a')]
@@ -83,7 +63,7 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            td_target = rule.discount * find_next_value(memory, agent, module, is_over)
+            td_target = rule.discount * compute_next_value(memory, agent, module, is_over)
             for other in range(memory.actions.shape[0]):
                 td_target += rule.weights[agent, other] * memory.rewards[other, module]
             value = get_last_value(memory, agent, module, action)

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
-from hose_learning.learners.distributed_rewards import make_weights
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.joint import (
     choose_each,
-    find_next_value,
+    compute_next_value,
     get_last_value,
+    make_weights,
     set_last_value,
 )
 from hose_learning.learners.round_robin import get_learning_rate
@@ -39,9 +39,7 @@ class DistributedValues(NamedTuple):
     weights: Floats
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; its options are those of `distributed_rewards`.
 
     Raises:
@@ -56,7 +54,7 @@ rules.choose_joint.register(DistributedValues)(choose_each)
 
 @rules.learn_joint.register(DistributedValues)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: DistributedValues, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Moves the value of each agent's action towards its reward and the neighbours' future.
 
     Q^i(s, a) <- (1 - alpha) Q^i(s, a) + alpha [r_i + gamma sum_j f(i, j) max_a' Q^j(s', a')]
@@ -66,7 +64,7 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
     for agent in range(n_agents):
         for module in range(learner.bases.shape[0]):
             for other in range(n_agents):
-                following = find_next_value(memory, other, module, is_over)
+                following = compute_next_value(memory, other, module, is_over)
                 discount = rule.discount * rule.weights[agent, other]
                 td_targets[agent, module] += discount * following
     alpha = get_learning_rate(learner, memory)

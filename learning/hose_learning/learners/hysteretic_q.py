@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.joint import (
     choose_each,
-    find_next_value,
+    compute_next_value,
     get_last_value,
     set_last_value,
 )
@@ -35,9 +35,7 @@ class Hysteretic(NamedTuple):
     beta_ratio: float
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -54,7 +52,7 @@ rules.choose_joint.register(Hysteretic)(choose_each)
 
 @rules.learn_joint.register(Hysteretic)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: Hysteretic, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Moves the value of each agent's action up fast or down slowly.
 
     delta = r + gamma max_a' Q^i(s', a') - Q^i(s, a)
@@ -64,7 +62,7 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            following = find_next_value(memory, agent, module, is_over)
+            following = compute_next_value(memory, agent, module, is_over)
             td_target = memory.rewards[agent, module] + rule.discount * following
             value = get_last_value(memory, agent, module, action)
             delta = td_target - value

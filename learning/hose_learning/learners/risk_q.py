@@ -12,12 +12,14 @@ import dataclasses
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
+from hose_learning.learners import round_robin
 from hose_learning.learners.round_robin import learn
 from hose_learning.modules import Module
-from hose_learning.policies import find_best, find_lowest_bit
+from hose_learning.policies import compute_best, find_lowest_bit
 from hose_learning.records import EPISODES, XI, Learner, Memory
 from hose_learning.settings import LearnerSettings, check_range, get_options
 from hose_learning.tables import find
@@ -53,9 +55,7 @@ class Measured(NamedTuple):
     risk: Floats
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; its risk module sees what the value module sees.
 
     Raises:
@@ -66,13 +66,13 @@ def make(
     check_range("xi_step", options["xi_step"], 0.0, 1e9)
     check_range("xi_most", options["xi_most"], 0.0, 1e9)
     check_range("settle_episodes", options["settle_episodes"], 0, 1e12)
-    values = [module for module in settings.modules if module.kind == "value"]
+    values = settings.select("value")
     if len(values) > 1:
         names = [module.name for module in values]
         raise InputError("modules", names, "one value module alone for risk-q")
     goal = values[0]
     risk = Module(name="risk", variables=goal.variables)
-    others = [module for module in settings.modules if module.kind == "veto"]
+    others = settings.select("veto")
     settings = dataclasses.replace(settings, modules=(goal, risk, *others))
     discounts = np.ones((2, task.n_agents + 1))
     discounts[GOAL] = float(settings.discount) ** np.arange(task.n_agents + 1.0)
@@ -89,9 +89,9 @@ def make(
     return learner, memory
 
 
-@rules.weigh.register(Risk)
+@rules.score.register(Risk)
 @jitable
-def weigh(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def score(rule: Risk, learner: Learner, memory: Memory, agent: int) -> None:
     """Writes the scores xi Q(s, a) - Q_risk(s, a)."""
     goal = find(memory.table, memory.keys[agent, GOAL])
     risk = find(memory.table, memory.keys[agent, RISK])
@@ -101,16 +101,16 @@ def weigh(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
         memory.scores[action] = value - rows[risk, action]
 
 
-@rules.meet.register(Risk)
+@rules.on_observe.register(Risk)
 @jitable
-def meet(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def on_observe(rule: Risk, learner: Learner, memory: Memory, agent: int) -> None:
     """Both tables learn from the action a* that is best now, by goal and risk together.
 
     Q(s, a) <- r + gamma Q(s', a*), Q_risk(s, a) <- [a constraint broke] + Q_risk(s', a*)
     """
-    weigh(rule, learner, memory, agent)
-    best = find_lowest_bit(find_best(memory.scores, (1 << memory.scores.shape[0]) - 1))
-    if memory.waited[agent] < 0:
+    score(rule, learner, memory, agent)
+    best = find_lowest_bit(compute_best(memory.scores, (1 << memory.scores.shape[0]) - 1))
+    if memory.steps_since_action[agent] < 0:
         if agent == 0:
             row = find(memory.table, memory.keys[agent, RISK])
             memory.own.risk[1] = memory.table.rows[row, best]
@@ -121,30 +121,28 @@ def meet(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
         learn(learner, memory, agent, module, following)
 
 
-@rules.gather.register(Risk)
+@rules.accumulate.register(Risk)
 @jitable
-def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+def accumulate(
+    rule: Risk, learner: Learner, memory: Memory, agent: int, action: int, events: int
+) -> None:
     """Adds rewards and broken constraints to the cycle of everyone who has moved."""
     for module in range(2):
         memory.rewards[agent, module] = 0.0
-    for other in range(memory.waited.shape[0]):
-        waited = memory.waited[other]
-        if waited >= 0:
+    for other in range(memory.steps_since_action.shape[0]):
+        steps = memory.steps_since_action[other]
+        if steps >= 0:
             for module in range(2):
                 reward = learner.rewards[events, int(other == agent), module]
-                memory.rewards[other, module] += rule.discounts[module, waited] * reward
-            memory.waited[other] = waited + 1
+                memory.rewards[other, module] += rule.discounts[module, steps] * reward
+            memory.steps_since_action[other] = steps + 1
 
 
-@rules.finish.register(Risk)
+@rules.end_episode.register(Risk)
 @jitable
-def finish(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def end_episode(rule: Risk, learner: Learner, memory: Memory, is_over: bool) -> None:
     """After a terminal state nothing follows; xi moves towards the bound of the risk."""
-    for agent in range(memory.waited.shape[0]):
-        if is_over and memory.waited[agent] >= 0:
-            for module in range(2):
-                learn(learner, memory, agent, module, 0.0)
-        memory.waited[agent] = -1
+    round_robin.end_episode(rule, learner, memory, is_over)
     risk = memory.own.risk
     risk[0] += (risk[1] - risk[0]) / AVERAGED_EPISODES
     if memory.counters[EPISODES] >= rule.settle_episodes:

@@ -6,13 +6,14 @@ state it then sees, is one step of its own Q-learning.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
-from hose_learning.mediators import find_highest
+from hose_learning.learner import Made, make_learner
+from hose_learning.mediators import compute_highest
 from hose_learning.records import MOVES, Learner, Memory
 from hose_learning.settings import LearnerSettings, get_options
 from hose_learning.tables import claim, find
@@ -32,18 +33,14 @@ class RoundRobin(NamedTuple):
     discounts: Floats
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner of eq. 6.4, which discounts every move (see `make_learner`)."""
     get_options(settings, {})
     discounts = float(settings.discount) ** np.arange(task.n_agents + 1.0)
     return make_learner(task, settings, RoundRobin(discounts), generator)
 
 
-def make_cycle_sum(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make_cycle_sum(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner of Algorithm 4.1, which discounts whole cycles (see `make_learner`)."""
     get_options(settings, {})
     discounts = np.ones(task.n_agents + 1)
@@ -52,13 +49,13 @@ def make_cycle_sum(
 
 
 @jitable
-def get_learning_rate(learner, memory):  # type: ignore[no-untyped-def]
+def get_learning_rate(learner: Learner, memory: Memory) -> float:
     """Returns alpha_t."""
     return learner.learning_rate / (1.0 + learner.learning_rate_decay * memory.counters[MOVES])
 
 
 @jitable
-def learn(learner, memory, agent, module, following):  # type: ignore[no-untyped-def]
+def learn(learner: Learner, memory: Memory, agent: int, module: int, following: float) -> None:
     """Moves the value of the agent's last action towards its rewards and what follows.
 
     Q(s, a) <- (1 - alpha) Q(s, a) + alpha [rewards of the cycle + following]     (eq. 6.4)
@@ -72,46 +69,48 @@ def learn(learner, memory, agent, module, following):  # type: ignore[no-untyped
     rows[row, action] += get_learning_rate(learner, memory) * (td_target - rows[row, action])
 
 
-@rules.meet.register(RoundRobin)
+@rules.on_observe.register(RoundRobin)
 @jitable
-def meet(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def on_observe(rule: Any, learner: Learner, memory: Memory, agent: int) -> None:
     """The cycle is complete: s_(t+N) is what the agent sees now."""
-    if memory.waited[agent] < 0:
+    if memory.steps_since_action[agent] < 0:
         return
     for module in range(learner.bases.shape[0]):
         row = find(memory.table, memory.keys[agent, module])
-        highest = find_highest(memory.table.rows, row)
+        highest = compute_highest(memory.table.rows, row)
         learn(learner, memory, agent, module, rule.discounts[-1] * highest)
 
 
 @jitable
-def add_rewards(rule, learner, memory, agent, events):  # type: ignore[no-untyped-def]
+def add_rewards(rule: Any, learner: Learner, memory: Memory, agent: int, events: int) -> None:
     """Adds r_(t+k), discounted, to the cycle of everyone who has moved; the agent's begins."""
     for module in range(learner.bases.shape[0]):
         memory.rewards[agent, module] = 0.0
-    for other in range(memory.waited.shape[0]):
-        waited = memory.waited[other]
-        if waited >= 0:
+    for other in range(memory.steps_since_action.shape[0]):
+        steps = memory.steps_since_action[other]
+        if steps >= 0:
             for module in range(learner.bases.shape[0]):
                 reward = learner.rewards[events, int(other == agent), module]
-                memory.rewards[other, module] += rule.discounts[waited] * reward
-            memory.waited[other] = waited + 1
+                memory.rewards[other, module] += rule.discounts[steps] * reward
+            memory.steps_since_action[other] = steps + 1
 
 
-@rules.gather.register(RoundRobin)
+@rules.accumulate.register(RoundRobin)
 @jitable
-def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+def accumulate(
+    rule: RoundRobin, learner: Learner, memory: Memory, agent: int, action: int, events: int
+) -> None:
     """The others' rewards of a cycle count as one's own."""
     add_rewards(rule, learner, memory, agent, events)
 
 
-@rules.finish.register(RoundRobin)
+@rules.end_episode.register(RoundRobin)
 @jitable
-def finish(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def end_episode(rule: Any, learner: Learner, memory: Memory, is_over: bool) -> None:
     """After a terminal state nothing follows; a cycle that was cut off teaches nothing."""
     if is_over:
-        for agent in range(memory.waited.shape[0]):
-            if memory.waited[agent] >= 0:
+        for agent in range(memory.steps_since_action.shape[0]):
+            if memory.steps_since_action[agent] >= 0:
                 for module in range(learner.bases.shape[0]):
                     learn(learner, memory, agent, module, 0.0)
-    memory.waited[:] = -1
+    memory.steps_since_action[:] = -1

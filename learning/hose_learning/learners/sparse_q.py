@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners import coordination
 from hose_learning.learners.coordination import (
     add_to_edge,
@@ -20,10 +20,9 @@ from hose_learning.learners.coordination import (
     make_coordination,
     maximize_module,
 )
-from hose_learning.learners.graphs import Graph
 from hose_learning.learners.joint import get_own_reward
 from hose_learning.learners.round_robin import get_learning_rate
-from hose_learning.learners.solvers import find_place
+from hose_learning.learners.solvers import Graph, compute_place
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, get_options
 from hose_mj.jit import jitable
@@ -49,9 +48,7 @@ class Sparse(NamedTuple):
     updates_by_agent: bool
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -71,7 +68,7 @@ rules.choose_joint.register(Sparse)(choose_on_graph)
 
 @rules.learn_joint.register(Sparse)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: Sparse, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Learns from the joint action a* that is best for the whole graph in the new state."""
     for module in range(learner.bases.shape[0]):
         if not is_over:
@@ -83,15 +80,17 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def get_next_value(rule, memory, edge, is_over):  # type: ignore[no-untyped-def]
+def get_next_value(rule: Sparse, memory: Memory, edge: int, is_over: bool) -> float:
     """Returns gamma Q_ij(s', a*_i, a*_j); 0 if the episode is over."""
     if is_over:
         return 0.0
-    return rule.discount * memory.own.values[find_place(rule.graph, edge, memory.own.best)]
+    return rule.discount * memory.own.values[compute_place(rule.graph, edge, memory.own.best)]
 
 
 @jitable
-def update_by_edge(rule, learner, memory, module, is_over):  # type: ignore[no-untyped-def]
+def update_by_edge(
+    rule: Sparse, learner: Learner, memory: Memory, module: int, is_over: bool
+) -> None:
     """Each edge learns from its agents' rewards, of which each of their edges gets its share.
 
     Q_ij(s, a_i, a_j) <- (1 - alpha) Q_ij(s, a_i, a_j)
@@ -110,7 +109,9 @@ def update_by_edge(rule, learner, memory, module, is_over):  # type: ignore[no-u
 
 
 @jitable
-def update_by_agent(rule, learner, memory, module, is_over):  # type: ignore[no-untyped-def]
+def update_by_agent(
+    rule: Sparse, learner: Learner, memory: Memory, module: int, is_over: bool
+) -> None:
     """Each agent's TD error is shared among its edges; its values are half of theirs.
 
     Q_k = 1/2 sum_j Q_kj,  delta_k = R_k + gamma Q_k(s', a*) - Q_k(s, a)

@@ -7,16 +7,17 @@ game's joint actions, which is exact and grows exponentially with the number of 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.joint import (
     allow_fallbacks,
+    compute_next_value,
     draw_each,
-    find_next_value,
     get_last_value,
     set_last_value,
     sum_team_reward,
@@ -28,7 +29,8 @@ from hose_learning.settings import LearnerSettings, get_options
 from hose_learning.tables import find
 from hose_mj.errors import InputError
 from hose_mj.jit import jitable
-from hose_mj.tasks.stream import draw_below, draw_unit
+from hose_mj.tasks.kernels import Floats, Integers
+from hose_mj.tasks.stream import Stream, draw_below, draw_unit
 from hose_mj.tasks.task import Task
 
 LARGEST_WIDTH = 1024
@@ -42,9 +44,7 @@ class Team(NamedTuple):
     n_actions: int
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -77,7 +77,7 @@ def check_team(task: Task, settings: LearnerSettings) -> None:
 
 
 @jitable
-def number_joint(actions, n_actions):  # type: ignore[no-untyped-def]
+def number_joint(actions: Integers, n_actions: int) -> int:
     """Returns the number of a joint action; the last agent's runs fastest."""
     joint = 0
     for agent in range(actions.shape[0]):
@@ -86,7 +86,7 @@ def number_joint(actions, n_actions):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def write_joint(joint, n_actions, actions):  # type: ignore[no-untyped-def]
+def write_joint(joint: int, n_actions: int, actions: Integers) -> None:
     """Writes the actions of a joint action (n_agents,)."""
     for agent in range(actions.shape[0] - 1, -1, -1):
         actions[agent] = joint % n_actions
@@ -94,7 +94,7 @@ def write_joint(joint, n_actions, actions):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def forbid(rule, learner, memory):  # type: ignore[no-untyped-def]
+def forbid(rule: Team, learner: Learner, memory: Memory) -> None:
     """Writes -inf as score of joint actions with a vetoed part or below a module's threshold."""
     for joint in range(memory.scores.shape[0]):
         write_joint(joint, rule.n_actions, memory.actions)
@@ -110,7 +110,7 @@ def forbid(rule, learner, memory):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def draw_best(scores, stream):  # type: ignore[no-untyped-def]
+def draw_best(scores: Floats, stream: Stream) -> int:
     """Draws one of the places with the highest score, or returns -1 if all are -inf."""
     highest, count = -math.inf, 0
     for place in range(scores.shape[0]):
@@ -129,7 +129,7 @@ def draw_best(scores, stream):  # type: ignore[no-untyped-def]
 
 @rules.choose_joint.register(Team)
 @jitable
-def choose_joint(rule, task, learner, memory, explores):  # type: ignore[no-untyped-def]
+def choose_joint(rule: Team, task: Any, learner: Learner, memory: Memory, explores: bool) -> None:
     """Chooses a joint action epsilon-greedily; to explore is to hold all of them for equal."""
     allow_fallbacks(task, learner, memory)
     if explores and draw_unit(memory.stream) < memory.numbers[EPSILON]:
@@ -148,7 +148,7 @@ def choose_joint(rule, task, learner, memory, explores):  # type: ignore[no-unty
 
 @rules.learn_joint.register(Team)
 @jitable
-def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def learn_joint(rule: Team, learner: Learner, memory: Memory, is_over: bool) -> None:
     """Moves the value of the joint action towards the team's reward and future.
 
     Q(s, a) <- (1 - alpha) Q(s, a) + alpha [r + gamma max_a' Q(s', a')], a = (a_1, .., a_N)
@@ -156,7 +156,7 @@ def learn_joint(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
     alpha = get_learning_rate(learner, memory)
     joint = number_joint(memory.actions, rule.n_actions)
     for module in range(learner.bases.shape[0]):
-        following = find_next_value(memory, 0, module, is_over)
+        following = compute_next_value(memory, 0, module, is_over)
         td_target = sum_team_reward(learner, memory, module) + rule.discount * following
         value = get_last_value(memory, 0, module, joint)
         if td_target != value:  # a row of zeros that stays so is not stored

@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from hose_learning import rules
-from hose_learning.learner import make_learner
+from hose_learning.learner import Made, make_learner
 from hose_learning.learners.round_robin import add_rewards, get_learning_rate
-from hose_learning.mediators import find_highest
+from hose_learning.mediators import compute_highest
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, check_range, get_options
 from hose_learning.tables import FIRST_CAPACITY, claim, find
@@ -37,7 +38,7 @@ class Traces(NamedTuple):
     trace_decay: float
 
 
-class Trail(NamedTuple):
+class EligibilityTrace(NamedTuple):
     """The last moves of each agent, the latest one first.
 
     Attributes:
@@ -53,9 +54,7 @@ class Trail(NamedTuple):
     lengths: Integers
 
 
-def make(
-    task: Task, settings: LearnerSettings, generator: np.random.Generator
-) -> tuple[Learner, Memory]:
+def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """Makes the learner; see `hose_learning.learner.make_learner`.
 
     Raises:
@@ -64,12 +63,12 @@ def make(
     options = get_options(settings, OPTIONS)
     check_range("trace_decay", options["trace_decay"], 0.0, 1.0)
     n_agents = task.n_agents
-    n_values = sum(module.kind == "value" for module in settings.modules)
+    n_values = len(settings.select("value"))
     # One move may write the whole trail of every agent, into the free half of a hashed table.
     most = FIRST_CAPACITY // 2 // (n_agents * n_values)
     check_range("n_kept", options["n_kept"], 1, most)
     n_kept = int(options["n_kept"])
-    own = Trail(
+    own = EligibilityTrace(
         keys=np.zeros((n_agents, n_kept, n_values), np.int64),
         actions=np.zeros((n_agents, n_kept), np.int64),
         ages=np.zeros((n_agents, n_kept), np.int64),
@@ -81,7 +80,7 @@ def make(
 
 
 @jitable
-def is_last(memory, agent, place):  # type: ignore[no-untyped-def]
+def is_last(memory: Memory, agent: int, place: int) -> bool:
     """Whether a remembered move is the agent's last action in what looks like the same state."""
     trail = memory.own
     same = trail.actions[agent, place] == memory.actions[agent]
@@ -91,7 +90,7 @@ def is_last(memory, agent, place):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def remember(memory, agent):  # type: ignore[no-untyped-def]
+def remember(memory: Memory, agent: int) -> None:
     """Puts the agent's last move first; it replaces an earlier one like it, or the oldest."""
     trail = memory.own
     length = trail.lengths[agent]
@@ -116,7 +115,9 @@ def remember(memory, agent):  # type: ignore[no-untyped-def]
 
 
 @jitable
-def learn(rule, learner, memory, agent, module, following):  # type: ignore[no-untyped-def]
+def learn(
+    rule: Traces, learner: Learner, memory: Memory, agent: int, module: int, following: float
+) -> None:
     """Raises the values of all remembered moves when the last cycle was better than expected.
 
     delta = sum_k gamma^k r_(t+k) + gamma^N max_a' Q(s_(t+N), a') - Q(s_t, a_t), and if delta > 0
@@ -139,33 +140,35 @@ def learn(rule, learner, memory, agent, module, following):  # type: ignore[no-u
         table.rows[row, trail.actions[agent, place]] += alpha * delta * share
 
 
-@rules.meet.register(Traces)
+@rules.on_observe.register(Traces)
 @jitable
-def meet(rule, learner, memory, agent):  # type: ignore[no-untyped-def]
+def on_observe(rule: Traces, learner: Learner, memory: Memory, agent: int) -> None:
     """The cycle is complete: s_(t+N) is what the agent sees now."""
-    if memory.waited[agent] < 0:
+    if memory.steps_since_action[agent] < 0:
         return
     for module in range(learner.bases.shape[0]):
         row = find(memory.table, memory.keys[agent, module])
-        highest = find_highest(memory.table.rows, row)
+        highest = compute_highest(memory.table.rows, row)
         learn(rule, learner, memory, agent, module, rule.discounts[-1] * highest)
 
 
-@rules.gather.register(Traces)
+@rules.accumulate.register(Traces)
 @jitable
-def gather(rule, learner, memory, agent, action, events):  # type: ignore[no-untyped-def]
+def accumulate(
+    rule: Traces, learner: Learner, memory: Memory, agent: int, action: int, events: int
+) -> None:
     """Remembers the move, and adds its rewards to the cycle of everyone who has moved."""
     remember(memory, agent)
     add_rewards(rule, learner, memory, agent, events)
 
 
-@rules.finish.register(Traces)
+@rules.end_episode.register(Traces)
 @jitable
-def finish(rule, learner, memory, is_over):  # type: ignore[no-untyped-def]
+def end_episode(rule: Traces, learner: Learner, memory: Memory, is_over: bool) -> None:
     """After a terminal state nothing follows; the trails end with the episode."""
-    for agent in range(memory.waited.shape[0]):
-        if is_over and memory.waited[agent] >= 0:
+    for agent in range(memory.steps_since_action.shape[0]):
+        if is_over and memory.steps_since_action[agent] >= 0:
             for module in range(learner.bases.shape[0]):
                 learn(rule, learner, memory, agent, module, 0.0)
-        memory.waited[agent] = -1
+        memory.steps_since_action[agent] = -1
         memory.own.lengths[agent] = 0

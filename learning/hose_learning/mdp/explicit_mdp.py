@@ -199,7 +199,7 @@ def evaluate(
     return np.asarray(values)
 
 
-def find_safe_actions(model: MarkovModel) -> Flags:
+def compute_safe_actions(model: MarkovModel) -> Flags:
     """Returns the effective action repertoires A^e (n_states, n_actions).
 
     An action is in A^e(s) if no state that it can lead to has a negative reward. A terminal state

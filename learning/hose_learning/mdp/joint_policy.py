@@ -13,6 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hose_learning import rules
+from hose_learning.evaluation import make_probe
+from hose_learning.loop import see
+from hose_learning.mediators import compute_above_thresholds
+from hose_learning.study.training import Training
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import OVER, Model
 from hose_mj.tasks.kernels import STEPS, TURN, Integers
@@ -239,3 +244,19 @@ def count_fewest_moves(model: Model, success: int) -> int | None:
         reached |= following
         frontier = sorted(following)
     return None
+
+
+def make_evaluate(training: Training) -> Callable[[int, State], dict[int, float]]:
+    """Makes a function of agent and state that returns the value of each action not vetoed."""
+    task, learner, probe = training.task, training.learner, make_probe(training.memory)
+
+    def evaluate(agent: int, state: State) -> dict[int, float]:
+        probe.state[:] = np.array(state)
+        allowed = see(task.kernel, learner, probe, agent)
+        if learner.has_thresholds:
+            allowed &= compute_above_thresholds(learner, probe, agent, task.n_actions)
+        rules.score(learner.rule, learner, probe, agent)
+        scores = probe.scores.tolist()
+        return {action: scores[action] for action in range(task.n_actions) if allowed >> action & 1}
+
+    return evaluate

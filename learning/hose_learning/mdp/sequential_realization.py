@@ -30,7 +30,7 @@ TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Violation:
+class SequentialViolation:
     """A property of Definition 10 that does not hold.
 
     Attributes:
@@ -56,7 +56,7 @@ class Violation:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class MoveOutcome:
     """What came of a move: the task's own part of the state, events, rewards, the end."""
 
     state: Integers
@@ -77,7 +77,7 @@ class SequentialStudy:
 
     n_states: int
     n_moves: int
-    violations: tuple[Violation, ...]
+    violations: tuple[SequentialViolation, ...]
 
 
 def study_sequential(
@@ -136,7 +136,9 @@ def _list_states(task: Task, starts: list[Integers], limit: int) -> list[Integer
     return list(seen.values())
 
 
-def move_alone(task: Task, state: Integers, agent: int, action: int, sharing: Sharing) -> Outcome:
+def move_alone(
+    task: Task, state: Integers, agent: int, action: int, sharing: Sharing
+) -> MoveOutcome:
     """Returns P(s, a_i, .) and R(s, a_i, .): the agent acts in its turn."""
     after = state.copy()
     after[TURN] = agent
@@ -151,7 +153,7 @@ def move_alone(task: Task, state: Integers, agent: int, action: int, sharing: Sh
 
 def move_jointly(
     task: Task, state: Integers, agent: int, action: int, idle: int, sharing: Sharing
-) -> Outcome:
+) -> MoveOutcome:
     """Returns **P**(s, a_i, .) and **R**(s, a_i, .): all others are idle."""
     after = state.copy()
     actions = np.full(task.n_agents, idle)
@@ -168,16 +170,16 @@ def move_jointly(
 
 def _make_outcome(
     task: Task, after: Integers, events: int, got: list[float], sharing: Sharing
-) -> Outcome:
+) -> MoveOutcome:
     if sharing == "team":
         worth = np.zeros(len(task.rewards))
         kernels.compute_rewards(task.kernel, events, 0, 0, worth)
         got = [worth.sum()]
     over = bool(kernels.is_over(task.kernel, events))
-    return Outcome(after, events, np.array(got), over)
+    return MoveOutcome(after, events, np.array(got), over)
 
 
-def compare(alone: Outcome, jointly: Outcome) -> list[int]:
+def compare(alone: MoveOutcome, jointly: MoveOutcome) -> list[int]:
     """Returns the numbers of the properties in which two outcomes differ."""
     holds = {
         1: (alone.state[HEADER:] == jointly.state[HEADER:]).all(),
@@ -193,13 +195,13 @@ def _make_violation(
     moves: list[tuple[Integers, int, int]],
     idle: int,
     sharing: Sharing,
-) -> Violation:
+) -> SequentialViolation:
     state, agent, action = moves[0]
     alone = move_alone(task, state, agent, action, sharing)
     jointly = move_jointly(task, state, agent, action, idle, sharing)
     shown = state.copy()
     shown[TURN] = agent
-    return Violation(
+    return SequentialViolation(
         number,
         len(moves),
         describe_state(task, shown),
@@ -210,7 +212,7 @@ def _make_violation(
     )
 
 
-def _describe(task: Task, outcome: Outcome) -> str:
+def _describe(task: Task, outcome: MoveOutcome) -> str:
     rewards = ", ".join(f"{reward:g}" for reward in outcome.rewards)
     after = describe_state(task, outcome.state, outcome.events)
     return f"{after}; rewards {rewards}" + "; the end" * outcome.over

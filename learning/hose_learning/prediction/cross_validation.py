@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy.stats import t as student
@@ -13,9 +13,65 @@ from sklearn.model_selection import StratifiedKFold
 from threadpoolctl import threadpool_limits
 
 from hose_learning.experience import Bools
-from hose_learning.prediction.measures import MEASURES, count_confusion
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats, Integers
+
+MEASURES = ("accuracy", "sensitivity", "specificity", "npv", "ppv")
+"""Names of the measures; npv and ppv are the negative and positive predictive value."""
+
+
+class Confusion(NamedTuple):
+    """How many instances of each class were taken for which.
+
+    Attributes:
+        true_positives: safe and taken for safe.
+        true_negatives: undesired and taken for undesired.
+        false_positives: undesired and taken for safe.
+        false_negatives: safe and taken for undesired.
+    """
+
+    true_positives: int
+    true_negatives: int
+    false_positives: int
+    false_negatives: int
+
+    def measure(self) -> Floats:
+        """Returns all measures in the order of `MEASURES` (5,), NaN where nothing is counted.
+
+        They are shares: of all instances, those taken for what they are; of the safe and of the
+        undesired, those taken for it; of those taken for undesired and for safe, those that are.
+        """
+        safe, undesired, missed, false_alarms = self
+        shares = (
+            (safe + undesired, sum(self)),
+            (safe, safe + false_alarms),
+            (undesired, undesired + missed),
+            (undesired, undesired + false_alarms),
+            (safe, safe + missed),
+        )
+        return np.array([part / whole if whole else math.nan for part, whole in shares])
+
+
+def count_confusion(undesired: Bools, predicted: Bools) -> Confusion:
+    """Counts what was taken for what.
+
+    Args:
+        undesired: the truth (n,).
+        predicted: what was taken for undesired (n,).
+
+    Raises:
+        InputError: different lengths.
+    """
+    if undesired.shape != predicted.shape:
+        valid = f"as long as the truth, {undesired.shape}"
+        raise InputError("shape of the predictions", predicted.shape, valid)
+    return Confusion(
+        int((~undesired & ~predicted).sum()),
+        int((undesired & predicted).sum()),
+        int((undesired & ~predicted).sum()),
+        int((~undesired & predicted).sum()),
+    )
+
 
 CONFIDENCE = 0.95
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -12,21 +14,79 @@ from scipy.stats import t as student
 
 from hose_learning.experience import Experience, record_experience
 from hose_learning.prediction.attributes import Encoding, make_attributes
-from hose_learning.prediction.classifiers import CLASSIFIERS, Setup, make_classifier
+from hose_learning.prediction.classifiers import CLASSIFIERS, ClusterRule, Setup, make_classifier
 from hose_learning.prediction.cross_validation import (
+    MEASURES,
     MakeClassifier,
     Score,
     compute_score,
     cross_validate,
     make_splits,
 )
-from hose_learning.prediction.measures import MEASURES
-from hose_learning.prediction.published import Published, Table, read_table
-from hose_learning.prediction.weka_substitutes import ClusterRule
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.registry import make_task
+
+MARGIN = 0.001
+"""The tables round their numbers (to 0.01 %), and average them over folds."""
+
+
+@dataclass(frozen=True)
+class Published:
+    """A row of a table.
+
+    Attributes:
+        measures: by the names of `MEASURES`, as fractions. The last column of Table 8.2b is headed
+            NPV but holds the positive predictive value, which its rows give within half a per cent,
+            so it is `ppv`.
+        doubtful: accuracy does not lie between sensitivity and specificity, as it must: one of the
+            three is misprinted.
+    """
+
+    measures: dict[str, float]
+    doubtful: bool
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """A table of the thesis.
+
+    Attributes:
+        number: such as "8.2".
+        data: what was classified, in words.
+        cycles: length of the log, in moves of each agent.
+        agents: for each agent, the rows by id of the classifier.
+    """
+
+    number: str
+    data: str
+    cycles: int
+    agents: tuple[dict[str, Published], ...]
+
+
+def read_table(task: str) -> PublishedTable | None:
+    """Returns the table about a task, None where there is none."""
+    text = files("hose_learning").joinpath("published.json").read_text(encoding="utf-8")
+    for table in json.loads(text)["tables"]:
+        if table["task"] == task:
+            agents = tuple(
+                {
+                    id: _make_row(dict(zip(agent["columns"], row, strict=True)))
+                    for id, row in agent["rows"].items()
+                }
+                for agent in table["agents"]
+            )
+            return PublishedTable(table["table"], table["data"], table["cycles"], agents)
+    return None
+
+
+def _make_row(per_cent: dict[str, float]) -> Published:
+    measures = {name: round(value / 100.0, 6) for name, value in per_cent.items()}
+    ends = sorted((measures["sensitivity"], measures["specificity"]))
+    is_between = ends[0] - MARGIN <= measures["accuracy"] <= ends[1] + MARGIN
+    return Published(measures, not is_between)
+
 
 Scores = dict[str, Score]
 """By the names of `MEASURES`."""
@@ -39,7 +99,7 @@ CONFIDENCE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class OfflinePlan:
     """What is to be measured.
 
     Attributes:
@@ -97,13 +157,13 @@ class Result:
 class Study:
     """All results, and the first log."""
 
-    plan: Plan
+    plan: OfflinePlan
     experience: Experience
-    table: Table | None
+    table: PublishedTable | None
     results: tuple[Result, ...]
 
 
-def run_study(plan: Plan, on_fold: Callable[[], object] = lambda: None) -> Study:
+def run_study(plan: OfflinePlan, on_fold: Callable[[], object] = lambda: None) -> Study:
     """Logs random moves, the step limit lifted, and cross-validates all classifiers on them.
 
     Args:
@@ -129,7 +189,7 @@ def run_study(plan: Plan, on_fold: Callable[[], object] = lambda: None) -> Study
 
 
 def score_log(
-    plan: Plan,
+    plan: OfflinePlan,
     experience: Experience,
     generator: np.random.Generator,
     on_fold: Callable[[], object],
@@ -152,7 +212,7 @@ def _make_maker(id: str, setup: Setup) -> MakeClassifier:
     return lambda seed: make_classifier(id, replace(setup, seed=seed))
 
 
-def count_folds(plan: Plan) -> int:
+def count_folds(plan: OfflinePlan) -> int:
     """Returns how often `run_study` calls `on_fold`."""
     folds = (plan.repeats + plan.logs - 1) * plan.folds
     return make_task(plan.task).n_agents * len(CLASSIFIERS) * folds

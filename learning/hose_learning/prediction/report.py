@@ -13,8 +13,7 @@ from rich.table import Table
 
 from hose_learning.experience import write_experience
 from hose_learning.prediction.classifiers import CLASSIFIERS
-from hose_learning.prediction.cross_validation import Score, compute_score
-from hose_learning.prediction.measures import MEASURES
+from hose_learning.prediction.cross_validation import MEASURES, Score, compute_score
 from hose_learning.prediction.offline import Result, Study
 from hose_mj.checks import Check
 from hose_mj.recording.document import format_document

@@ -58,6 +58,26 @@ class Experiment:
     conclude: Callable[[Runs, int], list[Finding]]
 
 
+def _make_mean(
+    claim: str, thesis: str, values: Sequence[float], n_seeds: int, check: Check | None = None
+) -> Finding:
+    """Makes a finding of the mean of the finite ones of some numbers."""
+    finite = [value for value in values if np.isfinite(value)]
+    nan = float("nan")
+    mean, interval = nan, (nan, nan)
+    if finite:
+        mean, interval = float(np.mean(finite)), compute_mean_interval(finite)
+    return Finding(claim, thesis, mean, interval, n_seeds, check)
+
+
+def _make_rate(
+    claim: str, thesis: str, hits: int, trials: int, n_seeds: int, check: Check | None = None
+) -> Finding:
+    """Makes a finding of a share of some trials."""
+    interval = compute_rate_interval(hits, trials)
+    return Finding(claim, thesis, hits / trials, interval, n_seeds, check)
+
+
 # Figure 4.2 (experiment A): does the veto help a team that sees little?
 
 _N_ROBOTS = (2, 3, 4)
@@ -89,16 +109,9 @@ def _conclude_experiment_a(runs: Runs, n_seeds: int) -> list[Finding]:
             claim = f"success of the last 10,000 episodes, N = {n}, {words}"
             worst = min(rates)
             limit = Check(f"{claim}: worst of {n_seeds} seeds", worst, 0.95, ">=")
-            findings.append(
-                Finding(
-                    claim,
-                    "far below it" if words == "no vetoes" else "rises to most episodes",
-                    float(np.mean(rates)),
-                    compute_mean_interval(rates),
-                    n_seeds,
-                    limit if words == "vetoes" else None,
-                )
-            )
+            said = "far below it" if words == "no vetoes" else "rises to most episodes"
+            check = limit if words == "vetoes" else None
+            findings.append(_make_mean(claim, said, rates, n_seeds, check))
     return findings
 
 
@@ -149,22 +162,11 @@ def _conclude_17(runs: Runs, n_seeds: int) -> list[Finding]:
             claim = f"steps of the greedy policy, {way}, {hose}"
             check = Check(f"{claim}: worst of {n_seeds} seeds", float(max(steps)), found, "<=")
             is_held = way.endswith("= 1") and hose == "bent hose"
-            ours, interval = _summarize(steps)
-            limit = check if is_held else None
-            findings.append(Finding(claim, "17", ours, interval, n_seeds, limit))
+            findings.append(_make_mean(claim, "17", steps, n_seeds, check if is_held else None))
         rates = [run["success_rate"] for run in runs[f"monolithic, {hose}"]]
         claim = f"success of the last tenth, monolithic Q-learning and vetoes, {hose}"
-        mean, interval = float(np.mean(rates)), compute_mean_interval(rates)
-        findings.append(Finding(claim, "never above .01", mean, interval, n_seeds))
+        findings.append(_make_mean(claim, "never above .01", rates, n_seeds))
     return findings
-
-
-def _summarize(steps: Sequence[float]) -> tuple[float, tuple[float, float]]:
-    """Returns mean and interval of the finite ones."""
-    finite = [s for s in steps if np.isfinite(s)]
-    if not finite:
-        return float("nan"), (float("nan"), float("nan"))
-    return float(np.mean(finite)), compute_mean_interval(finite)
 
 
 # Table 6.3: does a composed policy reach the goal?
@@ -226,26 +228,22 @@ def _conclude_table(runs: Runs, n_seeds: int) -> list[Finding]:
             (("n_g", "goal reached"), ("n_f", "valid greedy policy"))
         ):
             hits = sum(run[measure] is not None for run in results)
-            rate = hits / len(results)
             claim = f"{words}, share of {N_CONFIGURATIONS} configurations, {name}"
-            check = Check(claim, rate, 0.65, ">=")
-            is_held = name == HELD and measure == "n_f"
-            interval = compute_rate_interval(hits, len(results))
+            check = Check(claim, hits / len(results), 0.65, ">=")
+            limit = check if name == HELD and measure == "n_f" else None
             said = thesis.get(name, ("", ""))[place]
             n_own = n_seeds if name == HELD else min(n_seeds, N_PEER_SEEDS)
-            limit = check if is_held else None
-            findings.append(Finding(claim, said, rate, interval, n_own, limit))
+            findings.append(_make_rate(claim, said, hits, len(results), n_own, limit))
     both = [
         (one["s_b"], other["s_b"])
         for one, other in zip(runs["d-rr-ql"], runs["d-ql"], strict=False)
         if one["s_b"] is not None and other["s_b"] is not None
     ]
     if both:
-        equal = float(np.mean([one == other for one, other in both]))
-        interval = compute_rate_interval(round(equal * len(both)), len(both))
+        equal = sum(one == other for one, other in both)
         claim = f"best policies equally long, share of the {len(both)} where both have one"
         n_own = min(n_seeds, N_PEER_SEEDS)
-        findings.append(Finding(claim, "all of 4", equal, interval, n_own))
+        findings.append(_make_rate(claim, "all of 4", equal, len(both), n_own))
     return findings
 
 
@@ -279,14 +277,12 @@ def _conclude_taxi(runs: Runs, n_seeds: int) -> list[Finding]:
         hits = sum(run["n_f"] is not None for run in results)
         claim = f"valid greedy policy, share of runs at {len(DECREMENTS)} decrements, {learner}"
         check = Check(claim, hits / len(results), 1.0, ">=") if learner == "d-rr-ql" else None
-        interval = compute_rate_interval(hits, len(results))
         said = "all" if learner == "d-rr-ql" else "none below -0.0085"
-        findings.append(Finding(claim, said, hits / len(results), interval, n_seeds, check))
+        findings.append(_make_rate(claim, said, hits, len(results), n_seeds, check))
         steps = [run["s_b"] for run in results if run["s_b"] is not None]
         if steps:
-            mean, interval = float(np.mean(steps)), compute_mean_interval(steps)
             claim = f"steps of the best policy (joint moves), {learner}"
-            findings.append(Finding(claim, "", mean, interval, n_seeds))
+            findings.append(_make_mean(claim, "", steps, n_seeds))
     return findings
 
 

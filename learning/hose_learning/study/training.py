@@ -71,7 +71,7 @@ class Training:
 
     Args:
         task: the task.
-        learner_id: a key of `hose_learning.learners.catalog.LEARNERS`.
+        learner_id: one of `hose_learning.learners.catalog.list_learners`.
         settings: the learner's settings (`catalog.make_settings`).
         generator: seeds everything that is left to chance.
         compiled: whether loops run compiled; by default where they can.
@@ -196,7 +196,7 @@ class Training:
         return Episodes(results[:, 0], results[:, 1], np.full(episodes, np.nan))
 
     def restore(self, memory: Memory) -> None:
-        """Goes on from what was learned before (`hose_learning.study.saving`)."""
+        """Goes on from what was learned before (`hose_learning.study.run_folder`)."""
         self.memory = memory
 
 

@@ -4,7 +4,7 @@ from itertools import product
 import numpy as np
 import pytest
 from hose_learning import rules
-from hose_learning.loop import gather_joint, keep_keys, run_joint, see
+from hose_learning.loop import accumulate_joint, keep_keys, run_joint, see
 from hose_learning.modules import Module
 from hose_learning.records import make_log
 from hose_learning.settings import Exploration, LearnerSettings
@@ -54,8 +54,8 @@ class Trainee:
         memory.actions[:] = actions
         for agent in range(self.task.n_agents):
             keep_keys(self.learner, memory, agent)
-        events = kernels.apply_joint(kernel, memory.state, memory.actions, memory.charged)
-        gather_joint(self.learner, memory)
+        events = kernels.apply_joint(kernel, memory.state, memory.actions, memory.caused_events)
+        accumulate_joint(self.learner, memory)
         is_over = bool(kernels.is_over(kernel, events))
         if not is_over:
             self.look(memory.state.copy())

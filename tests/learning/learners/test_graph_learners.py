@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from hose_learning import rules
-from hose_learning.learners.coordination import find_edge_key
+from hose_learning.learners.coordination import compute_edge_key
 from hose_learning.modules import Module
 from hose_learning.records import EPISODES, FRESH
 
@@ -142,5 +142,5 @@ def test_an_edge_sees_what_its_first_agent_sees(line_of_three, make_trainee):
     assert len(set(cells)) == 3
     graph, memory = trainee.learner.rule.graph, trainee.memory
     for edge, first in enumerate((0, 0, 1)):
-        key = find_edge_key(graph, trainee.learner, memory.keys, edge, 0)
+        key = compute_edge_key(graph, trainee.learner, memory.keys, edge, 0)
         assert key == 49 * edge + cells[first]

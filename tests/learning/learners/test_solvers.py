@@ -2,9 +2,17 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hose_learning.learners.coordination import make_scratch
-from hose_learning.learners.graphs import make_graph, order_elimination, read_edges
-from hose_learning.learners.solvers import ASCENT, ELIMINATION, MAX_PLUS, compute_payoff, maximize
+from hose_learning.learners.solvers import (
+    ASCENT,
+    ELIMINATION,
+    MAX_PLUS,
+    compute_payoff,
+    make_graph,
+    make_scratch,
+    maximize,
+    order_elimination,
+    read_edges,
+)
 
 from hose_mj.errors import InputError
 

@@ -29,24 +29,24 @@ def learn_if_better(learner, memory, agent, following):
         round_robin.learn(learner, memory, agent, 0, following)
 
 
-@rules.meet.register(Optimistic)
-def meet(rule, learner, memory, agent):
-    if memory.waited[agent] >= 0:
+@rules.on_observe.register(Optimistic)
+def on_observe(rule, learner, memory, agent):
+    if memory.steps_since_action[agent] >= 0:
         highest = memory.table.rows[memory.keys[agent, 0]].max()
         learn_if_better(learner, memory, agent, rule.discounts[-1] * highest)
 
 
-@rules.gather.register(Optimistic)
-def gather(rule, learner, memory, agent, action, events):
+@rules.accumulate.register(Optimistic)
+def accumulate(rule, learner, memory, agent, action, events):
     round_robin.add_rewards(rule, learner, memory, agent, events)
 
 
-@rules.finish.register(Optimistic)
-def finish(rule, learner, memory, is_over):
-    for agent in range(len(memory.waited)):
-        if is_over and memory.waited[agent] >= 0:
+@rules.end_episode.register(Optimistic)
+def end_episode(rule, learner, memory, is_over):
+    for agent in range(len(memory.steps_since_action)):
+        if is_over and memory.steps_since_action[agent] >= 0:
             learn_if_better(learner, memory, agent, 0.0)
-    memory.waited[:] = -1
+    memory.steps_since_action[:] = -1
 
 
 @pytest.mark.parametrize("settings", [{}, {"n_cells": 5, "goal": 3, "starts": (0, 4)}])
@@ -102,7 +102,7 @@ moves = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 1)), max_size=20)
 
 @given(moves=moves, n_kept=st.integers(1, 5))
 def test_a_trail_is_the_list_of_different_moves_the_latest_first(moves, n_kept):
-    trail = traces.Trail(
+    trail = traces.EligibilityTrace(
         keys=np.zeros((1, n_kept, 1), np.int64),
         actions=np.zeros((1, n_kept), np.int64),
         ages=np.zeros((1, n_kept), np.int64),

@@ -1,7 +1,7 @@
 """The measures of chapter 6 on tasks where they are known."""
 
 import pytest
-from hose_learning.study.measures import measure
+from hose_learning.study.jobs import measure
 
 from hose_mj.tasks.registry import make_task
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hose_learning.prediction.classifiers import (
     CLASSIFIERS,
+    ClusterClassifier,
+    NaiveBayesTree,
+    RbfNetwork,
     Setup,
     count_split_attributes,
     make_classifier,
 )
-from hose_learning.prediction.published import read_table
-from hose_learning.prediction.weka_substitutes import ClusterClassifier, NaiveBayesTree, RbfNetwork
+from hose_learning.prediction.offline import read_table
 
 from hose_mj.errors import InputError
 

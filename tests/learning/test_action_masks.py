@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TimeLimit
-from hose_learning.action_masks import MaskedEnv, VetoMasks
+from hose_learning.action_masks import MaskedEnv, SharedPolicyEnv, VetoMasks
 from hose_learning.learners import catalog
-from hose_learning.mask_kernels import find_unvetoed
-from hose_learning.shared_policy import SharedPolicyEnv
+from hose_learning.loop import compute_unvetoed
 from hose_learning.study.training import Training
 from hose_learning.tables import FIRST_CAPACITY, SLOTS_PER_KEY
 
@@ -171,7 +170,7 @@ def test_compiled_and_plain_kernels_agree():
         agent = int(state[kernels.TURN])
         masks._memory.state[:] = state
         arguments = task.kernel, masks._learner, masks._memory, agent
-        assert find_unvetoed(*arguments) == find_unvetoed.py_func(*arguments)
+        assert compute_unvetoed(*arguments) == compute_unvetoed.py_func(*arguments)
 
 
 def test_a_constraint_is_broken_once_and_never_again():

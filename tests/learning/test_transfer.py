@@ -7,17 +7,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hose_learning import transfer as transfer_module
 from hose_learning.learners import catalog
 from hose_learning.loop import see
-from hose_learning.mdp.joint_policy import make_key
-from hose_learning.mdp.q_values import make_evaluate
+from hose_learning.mdp.joint_policy import make_evaluate, make_key
 from hose_learning.settings import Exploration
 from hose_learning.study.training import Training
 from hose_learning.tables import claim, find, make_table
-from hose_learning.transfer import transfer as transfer_module
-from hose_learning.transfer import trial as transfer_trial
-from hose_learning.transfer.transfer import transfer
-from hose_learning.transfer.trial import Plan, list_vetoes, make_tasks, run_trial
+from hose_learning.transfer import TransferPlan, list_vetoes, make_tasks, run_trial, transfer
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
@@ -257,7 +254,7 @@ def test_too_much_to_copy(monkeypatch):
         transfer(source, target)
 
 
-PLAN = Plan(
+PLAN = TransferPlan(
     source="line",
     target="line",
     source_options={"n_robots": 1, "half_width": 2, "hose_length": 3, "collision": "robots"},
@@ -274,7 +271,7 @@ def uncompiled(monkeypatch):
         def __init__(self, *arguments):
             super().__init__(*arguments, compiled=False)
 
-    monkeypatch.setattr(transfer_trial, "Training", Plain)
+    monkeypatch.setattr(transfer_module, "Training", Plain)
 
 
 def test_both_tasks_get_one_configuration():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from hose_learning.mdp.sequential_realization import (
-    Outcome,
+    MoveOutcome,
     compare,
     move_alone,
     move_jointly,
@@ -91,11 +91,11 @@ def test_a_joint_action_of_one_is_read_off_both_kernels():
 
 
 def test_every_difference_is_seen():
-    same = Outcome(np.array([0, 0, 3, 4]), 1, np.array([1.0, 2.0]), False)
-    assert compare(same, Outcome(np.array([1, 7, 3, 4]), 2, np.array([1.0, 2.0]), False)) == []
-    assert compare(same, Outcome(np.array([0, 0, 3, 5]), 1, np.array([1.0, 2.0]), False)) == [1]
-    assert compare(same, Outcome(np.array([0, 0, 3, 4]), 1, np.array([1.0, 2.5]), False)) == [2]
-    assert compare(same, Outcome(np.array([0, 0, 3, 4]), 1, np.array([1.0, 2.0]), True)) == [3]
+    same = MoveOutcome(np.array([0, 0, 3, 4]), 1, np.array([1.0, 2.0]), False)
+    assert compare(same, MoveOutcome(np.array([1, 7, 3, 4]), 2, np.array([1.0, 2.0]), False)) == []
+    assert compare(same, MoveOutcome(np.array([0, 0, 3, 5]), 1, np.array([1.0, 2.0]), False)) == [1]
+    assert compare(same, MoveOutcome(np.array([0, 0, 3, 4]), 1, np.array([1.0, 2.5]), False)) == [2]
+    assert compare(same, MoveOutcome(np.array([0, 0, 3, 4]), 1, np.array([1.0, 2.0]), True)) == [3]
 
 
 @pytest.mark.parametrize("id", ["maze", "line-single-agent", "taxi-single-agent"])

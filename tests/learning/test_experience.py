@@ -13,7 +13,7 @@ from hose_learning.experience import (
     record_experience,
     write_experience,
 )
-from hose_learning.experience_kernels import Rows, fill_rows
+from hose_learning.loop import Rows, fill_rows
 from hose_learning.policies import draw_allowed
 
 from hose_mj.errors import InputError

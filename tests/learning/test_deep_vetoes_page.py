@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "learners" / "deep-vetoes.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "learners" / "deep-vetoes.md"
 SB3 = "sb3-contrib is not installed: it comes with the extra deep"
 
 

@@ -6,8 +6,8 @@ import numba
 import numpy as np
 import pytest
 from hose_learning.experience import record_experience
-from hose_learning.prediction import usap_kernels
-from hose_learning.prediction.usap import UndesiredPredictor
+from hose_learning.learners import usap
+from hose_learning.learners.usap import UndesiredPredictor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.ensemble import RandomForestClassifier
@@ -67,7 +67,7 @@ def test_the_buffer_keeps_of_each_action_and_class_up_to_its_capacity_and_only_w
     for agent in range(2):
         attributes, undesired = predictor.list_instances(agent)
         assert len(attributes) == predictor.buffer.counts[agent].sum()
-        assert undesired.sum() == predictor.buffer.counts[agent, :, usap_kernels.UNDESIRED].sum()
+        assert undesired.sum() == predictor.buffer.counts[agent, :, usap.UNDESIRED].sum()
         for row, label in zip(attributes, undesired, strict=True):
             assert (agent, row[-1], label) == given_instances[row[0]]
 
@@ -114,8 +114,8 @@ def test_the_flat_forest_answers_as_scikit_learn_does(classifier):
 def test_compiled_code_gets_the_same_mask_and_fills_the_same_buffer():
     @numba.njit
     def run(buffer, forest, values, agent, action, stream):
-        usap_kernels.add_instance(buffer, values, agent, action, 1, stream)
-        return usap_kernels.compute_veto_mask(forest, values, agent)
+        usap.add_instance(buffer, values, agent, action, 1, stream)
+        return usap.compute_veto_mask(forest, values, agent)
 
     # Five instances a class: most of these replace one, at a place that the stream draws.
     one, other = (make_predictor(capacity=5, minimum=1, refit_every=50) for _ in range(2))
@@ -125,7 +125,7 @@ def test_compiled_code_gets_the_same_mask_and_fills_the_same_buffer():
     for values, agent, action in zip(log.values, log.agents, log.actions, strict=True):
         mask = run(one.buffer, one.forest, values, agent, action, one.stream)
         assert mask == other.veto_mask(values, agent)
-        usap_kernels.add_instance(other.buffer, values, agent, action, 1, other.stream)
+        usap.add_instance(other.buffer, values, agent, action, 1, other.stream)
     assert all(np.array_equal(a, b) for a, b in zip(one.buffer, other.buffer, strict=True))
 
 

@@ -1,25 +1,78 @@
-"""The picture of `hose-mj consensus`: clocks that agree, and agents that act by them."""
+"""Trials of turns by consensus: what clocks do at one loss of messages, measured and drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 
+from hose_learning.consensus.clocks import (
+    ConsensusSettings,
+    Record,
+    compute_disagreement,
+    compute_leads,
+    compute_longest_action,
+    count_disorder,
+    count_overlaps,
+    run_clocks,
+    simulate,
+)
 from hose_mj.recording.palette import OTHERS, darken, format_hex
 from hose_mj.recording.plots.labels import label_line_ends
 from hose_mj.recording.plots.style import SOFT, encode_png, make_figure
 
-if TYPE_CHECKING:
-    from hose_mj.cli.consensus import Trial
-
+SETTLING_TURNS, MEASURED_TURNS = 10, 40
+"""Turns after which clocks that run alone have agreed, and turns measured from then on."""
 SHOWN_TURNS = 1.0
 """Time during which the agreement is shown, in turns."""
 SHOWN_ACTIONS = 16
 
 
-def draw_consensus(trials: Sequence[Trial], own: Trial) -> bytes:
+class ConsensusTrial(NamedTuple):
+    """One loss: clocks alone, agents that act by them, and what was measured.
+
+    Attributes:
+        settings: the network.
+        clocks: clocks that run alone.
+        play: agents that act.
+        record: numbers for the document.
+    """
+
+    settings: ConsensusSettings
+    clocks: Record
+    play: Record
+    record: dict[str, float]
+
+
+def run_trial(settings: ConsensusSettings, seed: int) -> ConsensusTrial:
+    """Simulates one loss, twice: clocks alone, and agents that act by them."""
+    alone, playing = np.random.default_rng(seed).spawn(2)
+    settling = SETTLING_TURNS * settings.rounds
+    n_rounds = settling + MEASURED_TURNS * settings.rounds
+    clocks = run_clocks(settings, alone, n_rounds)
+    play = simulate(settings, playing)
+    leads = compute_leads(play)
+    lead = float(leads.max()) if len(leads) else 1.0  # clocks so coarse that they skip all turns
+    reached = (play.clocks.max(axis=1) >= settings.first_turn).argmax()
+    duration = (len(play.times) - reached) * settings.round_time  # the last round is over too
+    record = {
+        "loss": settings.loss,
+        "first_spread": float(play.spreads[0]),
+        "agreed_spread": float(play.spreads[reached]),
+        "disagreement": float(np.sqrt(clocks.clocks[settling:].var(axis=1).mean())),
+        "exact_disagreement": compute_disagreement(settings, clocks.rates),
+        "actions": len(play.actions),
+        "disorder": count_disorder(play.actions, settings),
+        "overlaps": count_overlaps(play.actions),
+        "longest_safe_action": compute_longest_action(lead, settings.drift),
+        "turns_per_time": settings.n_turns / float(duration),
+    }
+    return ConsensusTrial(settings, clocks, play, record)
+
+
+def draw_consensus(trials: Sequence[ConsensusTrial], own: ConsensusTrial) -> bytes:
     """Returns the PNG: disagreement over time above, the actions of one trial below.
 
     Args:
@@ -36,7 +89,7 @@ def draw_consensus(trials: Sequence[Trial], own: Trial) -> bytes:
         return encode_png(figure)
 
 
-def _draw_agreement(axes: Axes, trials: Sequence[Trial]) -> list[tuple[float, str, str]]:
+def _draw_agreement(axes: Axes, trials: Sequence[ConsensusTrial]) -> list[tuple[float, str, str]]:
     """Draws disagreement over time; returns where each line ends, its name and colour."""
     ends = []
     for place, trial in enumerate(trials):
@@ -57,7 +110,7 @@ def _draw_agreement(axes: Axes, trials: Sequence[Trial]) -> list[tuple[float, st
     return ends
 
 
-def _draw_actions(axes: Axes, trial: Trial) -> None:
+def _draw_actions(axes: Axes, trial: ConsensusTrial) -> None:
     """Draws a bar for each action, with its turn, on the line of its agent."""
     settings = trial.settings
     shown = trial.play.actions[:SHOWN_ACTIONS]

@@ -17,10 +17,10 @@ from hose_learning.mdp.joint_policy import (
     count_fewest_moves,
     estimate,
     find_idle,
+    make_evaluate,
     make_key,
     play_composed,
 )
-from hose_learning.mdp.q_values import make_evaluate
 from hose_learning.settings import Exploration
 from hose_learning.study.training import Training
 
@@ -294,7 +294,7 @@ class ExactDoors:
             for y, share in self.moves.get((x, actions[0]), {x: 1.0}).items()
         )
 
-    def find_best(self, x):
+    def compute_best(self, x):
         return max(product(range(3), repeat=2), key=lambda actions: self.sum_up(x, actions))
 
 
@@ -304,7 +304,7 @@ def test_an_agent_weighs_all_states_it_may_be_in():
     composed = compose((0, 0, START), exact.estimates, exact.evaluate, GAMMA, NONE)
     assert composed.messages[1] == pytest.approx({(1, 0, LEFT_DOOR): 0.6, (1, 0, RIGHT_DOOR): 0.4})
     assert exact.q[LEFT_DOOR].argmax() == LEFT
-    assert composed.actions == (LEFT, RIGHT) == exact.find_best(START)
+    assert composed.actions == (LEFT, RIGHT) == exact.compute_best(START)
     expected = {(NOBODY, 0, GOAL): 0.6 * 0.9 + 0.4, (NOBODY, 0, PIT): 0.06}
     assert composed.messages[2] == pytest.approx(expected)
     assert composed.value == pytest.approx(GAMMA * 94.0)
@@ -318,7 +318,7 @@ def test_where_the_chain_is_not_the_maximum():
     exact = ExactDoors(make_doors(bridge=0.97))
     composed = compose((0, 0, START), exact.estimates, exact.evaluate, GAMMA, NONE)
     assert composed.actions == (LEFT, RIGHT)
-    best = exact.find_best(START)
+    best = exact.compute_best(START)
     assert best[0] == RIGHT
     assert exact.sum_up(START, composed.actions) < exact.sum_up(START, best) < exact.q[START].max()
 

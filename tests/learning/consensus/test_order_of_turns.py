@@ -1,11 +1,14 @@
 import numpy as np
 import pytest
-from hose_learning.consensus.clocks import Action, ConsensusSettings, Record, simulate
-from hose_learning.consensus.consensus_measures import (
+from hose_learning.consensus.clocks import (
+    Action,
+    ConsensusSettings,
+    Record,
     compute_leads,
     compute_longest_action,
     count_disorder,
     count_overlaps,
+    simulate,
 )
 
 

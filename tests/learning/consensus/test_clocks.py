@@ -5,14 +5,12 @@ from hose_learning.consensus.clocks import (
     Messages,
     compute_clocks,
     compute_turns,
+    count_disorder,
+    count_overlaps,
     draw_messages,
     draw_rates,
     run_clocks,
     simulate,
-)
-from hose_learning.consensus.consensus_measures import (
-    count_disorder,
-    count_overlaps,
 )
 
 from hose_mj.errors import InputError

@@ -10,14 +10,19 @@ import pytest
 from hose_learning.prediction import offline
 from hose_learning.prediction.attributes import Encoding
 from hose_learning.prediction.classifiers import CLASSIFIERS
-from hose_learning.prediction.cross_validation import Score
-from hose_learning.prediction.measures import MEASURES
-from hose_learning.prediction.offline import Plan, Study, list_checks, list_records, run_study
+from hose_learning.prediction.cross_validation import MEASURES, Score
+from hose_learning.prediction.offline import (
+    OfflinePlan,
+    Study,
+    list_checks,
+    list_records,
+    run_study,
+)
 
 from hose_mj.errors import InputError
 from hose_mj.tasks.registry import make_task
 
-SHORT = Plan(cycles=150, repeats=2, folds=3, logs=2, seed=4)
+SHORT = OfflinePlan(cycles=150, repeats=2, folds=3, logs=2, seed=4)
 
 
 @pytest.fixture(scope="module")
@@ -126,4 +131,4 @@ def test_a_distance_within_the_spread_passes(study):
 @pytest.mark.parametrize("wrong", [{"cycles": 0}, {"logs": 0}, {"seed": -1}])
 def test_wrong_plans_are_refused(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
-        Plan(**wrong)
+        OfflinePlan(**wrong)

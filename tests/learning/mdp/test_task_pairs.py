@@ -4,8 +4,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hose_learning.mdp.partially_constrained import compute_propositions, find_violations
-from hose_learning.mdp.task_pairs import PAIRS, make_tasks, project_state, write_pair
+from hose_learning.mdp.partially_constrained import (
+    PAIRS,
+    compute_propositions,
+    find_violations,
+    make_tasks,
+    project_state,
+    write_pair,
+)
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels

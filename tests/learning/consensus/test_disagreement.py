@@ -6,13 +6,11 @@ from hose_learning.consensus.clocks import (
     ConsensusSettings,
     Messages,
     compute_clocks,
-    draw_rates,
-    run_clocks,
-)
-from hose_learning.consensus.second_moments import (
     compute_contraction,
     compute_disagreement,
     compute_speed,
+    draw_rates,
+    run_clocks,
 )
 
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from hose_learning.mdp.explicit_mdp import (
     MarkovModel,
+    compute_safe_actions,
     compute_worth,
     describe_state,
     evaluate,
-    find_safe_actions,
     solve,
     write_out,
 )
@@ -41,7 +41,7 @@ def test_values_and_safe_actions_by_hand(gamble):
     assert (q_values[1:] == 0.0).all()
     assert evaluate(gamble, np.array([0, 0, 0]), GAMMA) == pytest.approx([expected, 0, 0])
     assert evaluate(gamble, np.array([1, 0, 0]), GAMMA) == pytest.approx([0, 0, 0])
-    assert find_safe_actions(gamble).tolist() == [[False, True], [False, False], [False, False]]
+    assert compute_safe_actions(gamble).tolist() == [[False, True], [False, False], [False, False]]
 
 
 @pytest.mark.parametrize(

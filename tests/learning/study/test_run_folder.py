@@ -9,7 +9,7 @@ import pytest
 from hose_learning.learners import catalog
 from hose_learning.modules import Module
 from hose_learning.settings import Exploration, LearnerSettings
-from hose_learning.study import saving
+from hose_learning.study import run_folder
 from hose_learning.study.run_folder import CHECKPOINT, CONFIG, RunFolder
 from hose_learning.study.training import Training
 
@@ -64,20 +64,20 @@ def test_a_description_makes_the_same_training(check_same, id, options):
     task = make_task(id, **options)
     settings = catalog.make_settings("d-rr-ql", task)
     training = Training(task, "d-rr-ql", settings, np.random.default_rng(5))
-    description = saving.describe(training, 5)
-    again = saving.remake(pass_through_json(description))
+    description = run_folder.describe(training, 5)
+    again = run_folder.remake(pass_through_json(description))
     assert again.settings == training.settings
     assert again.task.settings == task.settings
     assert again.task.id == id
-    assert tuple(description) == saving.DESCRIPTION
+    assert tuple(description) == run_folder.DESCRIPTION
     check_same(training, again)
 
 
 def test_all_settings_pass_through_json():
     plain = pass_through_json(dataclasses.asdict(SETTINGS))
-    assert saving.read_settings(plain) == SETTINGS
+    assert run_folder.read_settings(plain) == SETTINGS
     traces = dataclasses.replace(SETTINGS, options={"trace_decay": 0.5, "n_kept": 3})
-    assert saving.read_settings(pass_through_json(dataclasses.asdict(traces))) == traces
+    assert run_folder.read_settings(pass_through_json(dataclasses.asdict(traces))) == traces
 
 
 CHANGES = [
@@ -102,16 +102,16 @@ CHANGES = [
 
 def test_an_identity_changes_with_any_setting():
     training = make()
-    base = saving.describe(training, 3)
-    identities = {saving.compute_identity(base)}
-    assert identities == {saving.compute_identity(pass_through_json(base))}
-    assert identities == {saving.compute_identity(dict(reversed(base.items())))}
-    others = [saving.describe(make(step_limit=99), 3), saving.describe(training, 4)]
+    base = run_folder.describe(training, 3)
+    identities = {run_folder.compute_identity(base)}
+    assert identities == {run_folder.compute_identity(pass_through_json(base))}
+    assert identities == {run_folder.compute_identity(dict(reversed(base.items())))}
+    others = [run_folder.describe(make(step_limit=99), 3), run_folder.describe(training, 4)]
     others.append({**base, "learner": "safe-msav"})
     for change in CHANGES:
         changed = dataclasses.asdict(dataclasses.replace(SETTINGS, **change))
         others.append({**base, "learner_settings": changed})
-    identities |= {saving.compute_identity(other) for other in others}
+    identities |= {run_folder.compute_identity(other) for other in others}
     assert len(identities) == 1 + len(others)
     assert {name for change in CHANGES for name in change} == {
         field.name for field in dataclasses.fields(LearnerSettings)
@@ -129,8 +129,8 @@ def test_what_is_read_goes_on_as_what_was_written(tmp_path, check_same, shrink_t
     training, other = (make(id, settings=settings, **options) for _ in range(2))
     training.advance(moves=701)
     assert not hashed or len(training.memory.table.keys) > 32
-    saving.save_memory(tmp_path / "a.npz", training.memory)
-    other.restore(saving.load_memory(tmp_path / "a.npz", other.memory))
+    run_folder.save_memory(tmp_path / "a.npz", training.memory)
+    other.restore(run_folder.load_memory(tmp_path / "a.npz", other.memory))
     check_same(training, other)
     for each in (training, other):
         each.advance(moves=400)
@@ -140,14 +140,14 @@ def test_what_is_read_goes_on_as_what_was_written(tmp_path, check_same, shrink_t
 def sign(path):
     """Makes the manifest say that the file is as it was written."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    (path.parent / saving.MANIFEST).write_text(json.dumps({path.name: [digest]}))
+    (path.parent / run_folder.MANIFEST).write_text(json.dumps({path.name: [digest]}))
 
 
 @pytest.fixture
 def saved(tmp_path):
     training = make()
     training.advance(moves=50)
-    saving.save_memory(tmp_path / "a.npz", training.memory)
+    run_folder.save_memory(tmp_path / "a.npz", training.memory)
     return tmp_path / "a.npz", training
 
 
@@ -164,7 +164,7 @@ def test_a_file_that_was_changed_is_refused(saved, damage):
     path, training = saved
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(InputError, match="its hash differs"):
-        saving.load_memory(path, training.memory)
+        run_folder.load_memory(path, training.memory)
 
 
 def test_a_file_that_is_no_archive_of_arrays_is_refused(saved):
@@ -180,19 +180,19 @@ def test_a_file_that_is_no_archive_of_arrays_is_refused(saved):
         path.write_bytes(data)
         sign(path)
         with pytest.raises(InputError, match="an npz file of arrays, whole"):
-            saving.load_memory(path, training.memory)
+            run_folder.load_memory(path, training.memory)
 
 
 def test_an_absent_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="a file that a training wrote"):
-        saving.load_memory(tmp_path / "a.npz", make().memory)
+        run_folder.load_memory(tmp_path / "a.npz", make().memory)
 
 
 def test_a_file_of_unknown_origin_is_refused(saved):
     path, training = saved
-    (path.parent / saving.MANIFEST).unlink()
+    (path.parent / run_folder.MANIFEST).unlink()
     with pytest.raises(InputError, match="hash differs"):
-        saving.load_memory(path, training.memory)
+        run_folder.load_memory(path, training.memory)
 
 
 @pytest.mark.parametrize(
@@ -208,53 +208,53 @@ def test_a_file_of_unknown_origin_is_refused(saved):
 def test_another_learners_file_is_refused(saved, other, name):
     path, _ = saved
     with pytest.raises(InputError, match=name.replace(".", r"\.")):
-        saving.load_memory(path, make(**other).memory)
+        run_folder.load_memory(path, make(**other).memory)
 
 
 def test_a_hashed_table_of_another_learner_or_without_room_is_refused(tmp_path, shrink_tables):
     shrink_tables(16)
     settings = dataclasses.replace(SETTINGS, hashed=True)
     training, path = make(settings=settings), tmp_path / "a.npz"
-    saving.save_memory(path, training.memory)
+    run_folder.save_memory(path, training.memory)
     with pytest.raises(InputError, match=r"table\.keys"):
-        saving.load_memory(path, make().memory)
+        run_folder.load_memory(path, make().memory)
     table = training.memory.table
     table.keys[:] = np.arange(1, 17)
     table.used[0] = 16
-    saving.save_memory(path, training.memory)
+    run_folder.save_memory(path, training.memory)
     with pytest.raises(InputError, match="table has room for its keys"):
-        saving.load_memory(path, training.memory)
+        run_folder.load_memory(path, training.memory)
 
 
 def test_a_crash_between_manifest_and_checkpoint_harms_nothing(saved, monkeypatch, check_same):
     path, training = saved
     before = make()
     before.advance(moves=50)
-    write = saving.write_atomically
+    write = run_folder.write_atomically
 
     def crash(target, data):
         if target == path:
             raise OSError("no space")
         write(target, data)
 
-    monkeypatch.setattr(saving, "write_atomically", crash)
+    monkeypatch.setattr(run_folder, "write_atomically", crash)
     for _ in range(2):
         training.advance(moves=10)
         with pytest.raises(OSError, match="no space"):
-            saving.save_memory(path, training.memory)
+            run_folder.save_memory(path, training.memory)
     after = make()
-    after.restore(saving.load_memory(path, after.memory))
+    after.restore(run_folder.load_memory(path, after.memory))
     check_same(after, before)
 
 
 def test_a_manifest_that_is_none_is_refused(saved):
     path, training = saved
-    (path.parent / saving.MANIFEST).write_text("[1, 2")
+    (path.parent / run_folder.MANIFEST).write_text("[1, 2")
     with pytest.raises(InputError, match="manifest"):
-        saving.load_memory(path, training.memory)
+        run_folder.load_memory(path, training.memory)
 
 
-DESCRIPTION = saving.describe(make(), 3)
+DESCRIPTION = run_folder.describe(make(), 3)
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,7 @@ DESCRIPTION = saving.describe(make(), 3)
 )
 def test_a_wrong_description_is_one_input_error(change):
     with pytest.raises(InputError):
-        saving.remake({**DESCRIPTION, **change})
+        run_folder.remake({**DESCRIPTION, **change})
 
 
 def test_a_run_goes_on_from_its_last_checkpoint(tmp_path, check_same):
@@ -340,3 +340,20 @@ def test_wrong_run_folders(tmp_path):
     (tmp_path / CHECKPOINT).write_bytes(b"nothing")
     with pytest.raises(InputError, match="hash differs"):
         folder.open()
+
+
+def test_a_checkpoint_with_the_names_of_before_is_read(tmp_path):
+    task = make_task("corridor")
+    settings = catalog.make_settings("d-rr-ql", task)
+    training = Training(task, "d-rr-ql", settings, np.random.default_rng(3), compiled=False)
+    training.advance(moves=40)
+    names = {new: old for old, new in run_folder.OLD_NAMES.items()}
+    arrays = run_folder.flatten(training.memory)
+    path = tmp_path / "last.npz"
+    np.savez_compressed(path, **{names.get(name, name): a for name, a in arrays.items()})
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    (tmp_path / "manifest.json").write_text(json.dumps({"last.npz": [digest]}))
+    again = run_folder.flatten(run_folder.load_memory(path, training.memory))
+    assert {name: a.tobytes() for name, a in again.items()} == {
+        name: a.tobytes() for name, a in arrays.items()
+    }

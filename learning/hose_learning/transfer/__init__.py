@@ -1,1 +1,0 @@
-"""Starting on a task from what was learned on a simpler one."""

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from hose_mj.hoses.protocol import Hold, HoseModel
     from hose_mj.hoses.registry import make_hose
     from hose_mj.hoses.spec import Fitting, HoseSpec
-    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+    from hose_mj.scenes.mjcf.catalogue import find_scene
+    from hose_mj.scenes.mjcf.scene import read_scene
     from hose_mj.tasks.registry import make_task
     from hose_mj.world.registry import make_world
 
@@ -60,7 +61,7 @@ _HOMES = {
     "Monitor": "hose_mj.constraints.monitor",
     "Obstacle": "hose_mj.hoses.obstacles",
     "StepError": "hose_mj.errors",
-    "find_scene": "hose_mj.scenes.mjcf.scene",
+    "find_scene": "hose_mj.scenes.mjcf.catalogue",
     "make_hose": "hose_mj.hoses.registry",
     "make_task": "hose_mj.tasks.registry",
     "make_world": "hose_mj.world.registry",

@@ -62,7 +62,7 @@ def run(args: Args) -> int:
     """Plays all sequences; 1 if two models agree in less than 90 % of them."""
     _check(args)
     from hose_mj.constraints.limits import Limits
-    from hose_mj.rollout.break_sequences import Kept, draw_sequences, play_all
+    from hose_mj.rollout.break_sequences import EndingsFile, draw_sequences, play_all
     from hose_mj.scenes.mjcf.scene import find_scene, read_scene
     from hose_mj.world.initial_shape import count_control_points
     from hose_mj.world.registry import make_world
@@ -81,7 +81,7 @@ def run(args: Args) -> int:
             settings = {"scene": args.scene, "model": model, "seed": args.seed}
             settings |= {"moves": args.moves, "max_tension": args.max_tension}
             options = {"control_points": points} if model == "geds" else {}
-            kept = Kept(args.out and args.out / f"{model}.json", settings | options)
+            kept = EndingsFile(args.out and args.out / f"{model}.json", settings | options)
             make = partial(make_world, scene, model, **options)
             endings[model] = play_all(make, sequences, limits, kept, advance)
     pairs = [

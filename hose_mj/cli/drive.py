@@ -15,8 +15,8 @@ from hose_mj.cli.display import check_display
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
-from hose_mj.rollout.drawing import draw_hose
 from hose_mj.rollout.episode import is_at_goal
+from hose_mj.rollout.video import draw_hose
 from hose_mj.world.driving import Driver
 from hose_mj.world.registry import WORLDS, make_world
 from hose_mj.world.world import World
@@ -130,7 +130,7 @@ def _show(desk: Desk) -> None:
 
     world = desk.world
     gravity = float(np.linalg.norm(world.model.opt.gravity))
-    limit = desk.monitor.limits.find_tension(world.scene.spec, gravity)
+    limit = desk.monitor.limits.compute_tension_limit(world.scene.spec, gravity)
     span = 1.0 / PICTURES_PER_SECOND
     with mujoco.viewer.launch_passive(
         world.model, world.data, key_callback=desk.press, show_left_ui=False, show_right_ui=False

@@ -15,7 +15,7 @@ from hose_mj.cli.rollout_recording import Recording
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
-from hose_mj.rollout.episode import Observer, Outcome, Policy, run_episode
+from hose_mj.rollout.episode import EpisodeResult, Observer, Policy, run_episode
 from hose_mj.rollout.policies import POLICIES, make_policy
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.registry import WORLDS, make_world
@@ -67,7 +67,7 @@ class Rollout:
     """
 
     world: World
-    outcome: Outcome
+    outcome: EpisodeResult
     wall_s: float
     overhead: float
 
@@ -124,7 +124,7 @@ class _Timed:
             observer.sample(world, monitor, info)
         self._spent += time.perf_counter() - begun
 
-    def finish(self, outcome: Outcome) -> None:
+    def finish(self, outcome: EpisodeResult) -> None:
         self.overhead = self._spent / (time.perf_counter() - self._begun - self._spent)
         for observer in self._observers:
             observer.finish(outcome)

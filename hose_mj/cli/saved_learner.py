@@ -16,7 +16,7 @@ from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import STEPS, TURN
 from hose_mj.tasks.line.kernels import Line
 from hose_mj.tasks.stream import make_stream
-from hose_mj.world.actions import Actions, find_cells
+from hose_mj.world.actions import Actions, compute_cells
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
@@ -78,7 +78,7 @@ class SavedLearner:
             "cells along the hose": (round(length, 6), settings.hose_length),
         }
         if isinstance(settings.goal, tuple):
-            goal = find_cells(world, world.goal_position())
+            goal = compute_cells(world, world.goal_position())
             facts["goal's cell"] = ((int(goal[0]), int(goal[1])), settings.goal)
         for name, (found, learned) in facts.items():
             if found != learned:
@@ -88,8 +88,8 @@ class SavedLearner:
         """The robot whose turn it is, and its action."""
         task, learner, memory = self._training.task, self._training.learner, self._memory
         h = task.settings.half_width
-        cells = find_cells(self._world, self._world.site_positions()[:-1])[:, :2]
-        goal = find_cells(self._world, self._world.goal_position())[:2]
+        cells = compute_cells(self._world, self._world.site_positions()[:-1])[:, :2]
+        goal = compute_cells(self._world, self._world.goal_position())[:2]
         memory.state[task.layout["robots"]] = np.clip(cells, -h, h).ravel()
         memory.state[task.layout["source"]] = 0
         memory.state[task.layout["goals"]] = np.clip(goal, -h, h)

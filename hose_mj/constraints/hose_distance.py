@@ -1,4 +1,4 @@
-"""The least distance between a geom and a stretch of a hose's centre line, to rounding.
+"""Finds the least distance between a geom and a part of a hose's centre line, to rounding.
 
 f(u) is the geom's signed distance at r(u) on one cubic piece. A piece is left out when a ball about
 it is farther away than what was found before. On the others f is looked at in five places; between
@@ -12,11 +12,17 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.hoses.geds.shapes import measure
+from hose_mj.hoses.protocol import Array
 from hose_mj.jit import kernel
+
+Point = tuple[float, float, float]
+Line = tuple[Array, Array, Array]
+"""Arc lengths (K + 1,), m, coefficients (K, 4, 3), m, and balls (K, 5) of a line's pieces."""
 
 _PARTS = 4
 """Parts of a piece between which f is looked at."""
 _TURNS = 60
+"""Steps of Newton's method at most: halving alone would need 34 to `_FINE`."""
 _FINE = 1e-10
 """Width in u at which a minimum is found; a kink of f is then missed by no more than this times the
 piece's length."""
@@ -25,7 +31,7 @@ BALL = 5
 
 
 @kernel
-def update_balls(coefficients, balls):  # type: ignore[no-untyped-def]
+def update_balls(coefficients: Array, balls: Array) -> None:
     """Writes a ball (K, 5) about each cubic piece (K, 4, 3).
 
     With v = u - 1/2 a piece is its middle + d1 v + d2 v^2 + d3 v^3, |v| <= 1/2.
@@ -44,15 +50,15 @@ def update_balls(coefficients, balls):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def locate(arcs, arc):  # type: ignore[no-untyped-def]
-    """The piece (number, u) that an arc length lies on."""
+def locate(arcs: Array, arc: float) -> tuple[int, float]:
+    """Finds the piece (number, u) that an arc length lies on."""
     k = min(max(np.searchsorted(arcs, arc, side="right") - 1, 0), arcs.shape[0] - 2)
     return k, (arc - arcs[k]) / (arcs[k + 1] - arcs[k])
 
 
 @kernel
-def find_point(coefficients, k, u):  # type: ignore[no-untyped-def]
-    """r(u) on piece k."""
+def compute_point(coefficients: Array, k: int, u: float) -> Point:
+    """Computes r(u) on piece k."""
     c = coefficients
     return (
         c[k, 0, 0] + u * (c[k, 1, 0] + u * (c[k, 2, 0] + u * c[k, 3, 0])),
@@ -62,8 +68,8 @@ def find_point(coefficients, k, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def find_slope(coefficients, k, u):  # type: ignore[no-untyped-def]
-    """dr/du on piece k."""
+def compute_slope(coefficients: Array, k: int, u: float) -> Point:
+    """Computes dr/du on piece k."""
     c = coefficients
     return (
         c[k, 1, 0] + u * (2.0 * c[k, 2, 0] + 3.0 * u * c[k, 3, 0]),
@@ -73,15 +79,15 @@ def find_slope(coefficients, k, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a: Point, b: Point) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
-def _look(rows, g, c, k, u):  # type: ignore[no-untyped-def]
-    """f, f' and f'' at u."""
-    distance, normal, bend, axis = measure(rows, g, find_point(c, k, u))
-    slope = find_slope(c, k, u)
+def _look(rows: Array, g: int, c: Array, k: int, u: float) -> tuple[float, float, float]:
+    """Computes f, f' and f'' at u."""
+    distance, normal, bend, axis = measure(rows, g, compute_point(c, k, u))
+    slope = compute_slope(c, k, u)
     turn = (
         2.0 * c[k, 2, 0] + 6.0 * u * c[k, 3, 0],
         2.0 * c[k, 2, 1] + 6.0 * u * c[k, 3, 1],
@@ -93,8 +99,8 @@ def _look(rows, g, c, k, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _find_minimum(rows, g, c, k, low, high):  # type: ignore[no-untyped-def]
-    """u of a minimum between low, where f falls, and high, where it rises."""
+def _find_minimum(rows: Array, g: int, c: Array, k: int, low: float, high: float) -> float:
+    """Finds u of a minimum between low, where f falls, and high, where it rises."""
     u = 0.5 * (low + high)
     for _ in range(_TURNS):
         _, slope, bend = _look(rows, g, c, k, u)
@@ -112,8 +118,10 @@ def _find_minimum(rows, g, c, k, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search_piece(rows, g, c, k, ends, speed, best):  # type: ignore[no-untyped-def]
-    """The least f on a part of piece k where it is below `best`: (f, u), else (best, -1)."""
+def _search_piece(
+    rows: Array, g: int, c: Array, k: int, ends: tuple[float, float], speed: float, best: float
+) -> tuple[float, float]:
+    """Finds the least f on a part of piece k where it is below `best`: (f, u), else (best, -1)."""
     width = (ends[1] - ends[0]) / _PARTS
     at = -1.0
     left, falls, _ = _look(rows, g, c, k, ends[0])
@@ -134,8 +142,10 @@ def _search_piece(rows, g, c, k, ends, speed, best):  # type: ignore[no-untyped-
 
 
 @kernel
-def find_nearest(rows, g, line, low, high, best):  # type: ignore[no-untyped-def]
-    """The point of the centre line nearest to geom g, among arc lengths from low to high.
+def find_nearest(
+    rows: Array, g: int, line: Line, low: float, high: float, best: float
+) -> tuple[float, int, float]:
+    """Finds the point of the centre line nearest to geom g, among arc lengths from low to high.
 
     Args:
         rows: geoms, as in hoses/geds/shapes.py.

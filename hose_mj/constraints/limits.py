@@ -8,10 +8,13 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 WEIGHTS = 2.0
-"""A hose may always be pulled by so many times its own weight, see `Limits.find_tension`."""
+"""A hose may always be pulled by so many times its own weight (`compute_tension_limit`)."""
 TOUCHING = 0.1
+"""Run-over distance by default, in radii of the hose."""
 OWN_RADII = 3.0
+"""Hose to either side of an attachment that is a robot's own by default, in its radii."""
 SIGHT_RADII = 5.0
+"""How far distances are measured by default, in radii of the largest robot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,8 +22,8 @@ class Limits:
     """When a constraint counts as broken.
 
     Attributes:
-        max_tension: of a segment (N); None for the rule of `find_tension`.
-        max_strain: what `find_tension` grants by the hose's axial stiffness.
+        max_tension: of a segment (N); None for the rule of `compute_tension_limit`.
+        max_strain: what `compute_tension_limit` grants by the hose's axial stiffness.
         max_lengthening: a segment is also broken when it is longer than at rest by this fraction,
             whatever tension the model reports.
         own_arc: hose that never counts as run over, to either side of a robot's own attachment (m
@@ -63,8 +66,8 @@ class Limits:
         if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
             raise InputError("ground", names, "a tuple of names of geoms")
 
-    def find_tension(self, spec: HoseSpec, gravity: float) -> float:
-        """The tension at which a segment breaks (N).
+    def compute_tension_limit(self, spec: HoseSpec, gravity: float) -> float:
+        """Returns the tension at which a segment breaks (N).
 
         `max_tension` where it is given. Otherwise the greater of `max_strain` EA and twice the
         weight of the whole hose, so that a soft hose may be dragged over a floor or hang.
@@ -74,18 +77,19 @@ class Limits:
         weight = spec.linear_density * spec.length * gravity
         return max(self.max_strain * spec.axial_stiffness, WEIGHTS * weight)
 
-    def find_clearances(self, radius: float) -> tuple[float, float, float, float]:
-        """Run-over, collision, bounds and obstacle distance (m) for a hose of a radius (m)."""
+    def compute_run_over_distance(self, radius: float) -> float:
+        """Distance (m) at which a robot and a hose of a radius (m) count as met."""
         near = self.run_over_distance
-        return (
-            *(TOUCHING * radius if near is None else near, self.collision_distance),
-            *(self.bounds_distance, self.obstacle_distance),
-        )
+        return TOUCHING * radius if near is None else near
 
-    def find_own_arc(self, radius: float) -> float:
-        """Hose to either side of an attachment that never counts for a robot of a radius (m)."""
+    def compute_own_arc(self, radius: float) -> float:
+        """Returns how much hose (m) to either side of an attachment never counts as run over.
+
+        Args:
+            radius: of the robot that holds it (m).
+        """
         return OWN_RADII * radius if self.own_arc is None else self.own_arc
 
-    def find_sight(self, radius: float) -> float:
-        """How far distances are measured where `radius` (m) is the largest robot's."""
+    def compute_sight(self, radius: float) -> float:
+        """Returns how far (m) distances are measured where `radius` (m) is the largest robot's."""
         return SIGHT_RADII * radius if self.sight is None else self.sight

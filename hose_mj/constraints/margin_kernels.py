@@ -1,21 +1,31 @@
 """All margins of a world in one compiled call, but for pairs of geoms that are left to MuJoCo.
 
-`t` is everywhere the `Tables` of margin_tables.py.
+A kind of constraint (kinds.py) is measured by a kernel here, which `measure_margins` calls. `t` is
+everywhere the `Tables`: margins of a kind begin at `t.starts[KIND]` and end at
+`t.starts[KIND + 1]`, and things may come as near as `t.clearances[KIND]`.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hose_mj.constraints.hose_distance import (
+    Point,
+    compute_point,
+    compute_slope,
     find_nearest,
-    find_point,
-    find_slope,
     locate,
     update_balls,
 )
+from hose_mj.constraints.kinds import BOUNDS, COLLISION, OBSTACLE, RUN_OVER
 from hose_mj.hoses.geds.shapes import BOUND, KIND, POSITION, ROTATION, SIZE, measure
+from hose_mj.hoses.protocol import Array
 from hose_mj.jit import kernel
+
+Ints = NDArray[np.int64]
 
 OTHER_KIND = -1.0
 """In a row of hoses/geds/shapes.py: a geom of which only the bounding ball counts here."""
@@ -23,8 +33,68 @@ _GAUSS = ((0.5 - np.sqrt(0.15), 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + np.sqrt(0
 """Places in [0, 1] and weights of three-point Gauss quadrature."""
 
 
+class Tables(NamedTuple):
+    """What does not change while a monitor watches, and room to work in.
+
+    Attributes:
+        radius: of the hose, m.
+        tension: that breaks a segment, N.
+        stiffness: the hose's axial stiffness, N.
+        lengthening: that breaks a segment, as a fraction.
+        sight: distances are measured up to this, m.
+        clearances: of each kind, in the order of `KINDS` (n_kinds,), m.
+        bounds: low and high corner (2, 3), m.
+        starts: the first margin of each kind, in this order, and the end (n_kinds + 1,).
+        segments: arc lengths of the attachments from the source's, (N + 1,), m.
+        own: arc lengths between which a robot's own hose lies (N, 2), m.
+        samples: arc lengths where tension is known (T,), m.
+        sample_segments: the segment of each (T,).
+        parts: parts of the hose within one piece and one segment: piece, segment (P, 2).
+        part_ends: where they begin and end within the piece (P, 2).
+        rows: geoms of robots and obstacles, as in hoses/geds/shapes.py (G, ROW).
+        ids: their numbers in the mjModel (G,).
+        robot_rows: robot i has the rows from its entry to the next one's (N + 1,).
+        upright: whether a robot is one cylinder that stays upright (N,).
+        obstacles: whether a robot's geom may hit a geom (R, G).
+        balls: of the hose's pieces (K, 5).
+        hulls: centre and radius of a ball about each robot (N, 4), m.
+        near: pairs of geoms left to MuJoCo: rows and margin (Q, 3).
+        gaps: lower bounds on the distances of these pairs (Q,), m.
+        margins: (M,).
+        places: (M, 3), m.
+        others: segment or row that a margin is about, -1 for none (M,).
+    """
+
+    radius: float
+    tension: float
+    stiffness: float
+    lengthening: float
+    sight: float
+    clearances: Array
+    bounds: Array
+    starts: Ints
+    segments: Array
+    own: Array
+    samples: Array
+    sample_segments: Ints
+    parts: Ints
+    part_ends: Array
+    rows: Array
+    ids: Ints
+    robot_rows: Ints
+    upright: NDArray[np.bool_]
+    obstacles: NDArray[np.bool_]
+    balls: Array
+    hulls: Array
+    near: Ints
+    gaps: Array
+    margins: Array
+    places: Array
+    others: Ints
+
+
 @kernel
-def _put(t, m, margin, place, other):  # type: ignore[no-untyped-def]
+def _put(t: Tables, m: int, margin: float, place: Point, other: int) -> None:
     """Writes margin m."""
     t.margins[m] = margin
     t.others[m] = other
@@ -33,7 +103,7 @@ def _put(t, m, margin, place, other):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _place_geoms(t, positions, rotations):  # type: ignore[no-untyped-def]
+def _place_geoms(t: Tables, positions: Array, rotations: Array) -> None:
     """Copies geom_xpos and geom_xmat into the rows, and lays a ball about each robot."""
     for g in range(t.ids.shape[0]):
         for c in range(3):
@@ -56,10 +126,11 @@ def _place_geoms(t, positions, rotations):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure_stretch(t, arcs, coefficients, tensions):  # type: ignore[no-untyped-def]
+def _measure_stretch(t: Tables, arcs: Array, coefficients: Array, tensions: Array) -> None:
     """Per segment: by its largest tension, and by its length, as a tension by Hooke's law.
 
-    While a segment is looked at, its margin holds its length.
+    Stretch is the first kind, so margin i is segment i's. While a segment is looked at, its margin
+    holds its length.
     """
     n = t.segments.shape[0] - 1
     for i in range(n):
@@ -69,7 +140,7 @@ def _measure_stretch(t, arcs, coefficients, tensions):  # type: ignore[no-untype
         k = t.parts[p, 0]
         low, width = t.part_ends[p, 0], t.part_ends[p, 1] - t.part_ends[p, 0]
         for place, weight in _GAUSS:
-            d = find_slope(coefficients, k, low + place * width)
+            d = compute_slope(coefficients, k, low + place * width)
             length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
             t.margins[t.parts[p, 1]] += weight * width * length
     for j in range(tensions.shape[0]):
@@ -81,11 +152,11 @@ def _measure_stretch(t, arcs, coefficients, tensions):  # type: ignore[no-untype
         strain = t.margins[i] / (t.segments[i] - t.segments[i + 1]) - 1.0
         k, u = locate(arcs, t.samples[peak])
         margin = min(t.tension - tensions[peak], t.stiffness * (t.lengthening - strain))
-        _put(t, i, margin, find_point(coefficients, k, u), i)
+        _put(t, i, margin, compute_point(coefficients, k, u), i)
 
 
 @kernel
-def _measure_run_over(t, arcs, coefficients):  # type: ignore[no-untyped-def]
+def _measure_run_over(t: Tables, arcs: Array, coefficients: Array) -> None:
     """Per robot: how far its geoms are from the hose's surface, its own hose left out."""
     n = t.own.shape[0]
     line = (arcs, coefficients, t.balls)
@@ -98,19 +169,19 @@ def _measure_run_over(t, arcs, coefficients):  # type: ignore[no-untyped-def]
                 best, k, u = find_nearest(t.rows, g, line, low, high, best)
                 if k >= 0:
                     piece, at = k, u
-        margin = best - t.radius - t.clearances[0]
+        margin = best - t.radius - t.clearances[RUN_OVER]
         if piece < 0:
-            _put(t, t.starts[1] + i, margin, t.hulls[i], -1)
+            _put(t, t.starts[RUN_OVER] + i, margin, t.hulls[i], -1)
             continue
         arc = arcs[piece] + at * (arcs[piece + 1] - arcs[piece])
         segment = 0
         while segment < n - 1 and arc < t.segments[segment + 1]:
             segment += 1
-        _put(t, t.starts[1] + i, margin, find_point(coefficients, piece, at), segment)
+        _put(t, t.starts[RUN_OVER] + i, margin, compute_point(coefficients, piece, at), segment)
 
 
 @kernel
-def _measure_discs(t, i, j, m):  # type: ignore[no-untyped-def]
+def _measure_discs(t: Tables, i: int, j: int, m: int) -> None:
     """Two upright cylinders: across, above one another, or from rim to rim."""
     a, b = t.robot_rows[i], t.robot_rows[j]
     d0 = t.rows[b, POSITION] - t.rows[a, POSITION]
@@ -129,36 +200,38 @@ def _measure_discs(t, i, j, m):  # type: ignore[no-untyped-def]
         t.rows[a, POSITION + 1] + part * d1,
         t.rows[a, POSITION + 2] + 0.5 * d2,
     )
-    _put(t, m, min(distance, t.sight) - t.clearances[1], place, j)
+    _put(t, m, min(distance, t.sight) - t.clearances[COLLISION], place, j)
 
 
 @kernel
-def _find_gap(rows, center, reach, g):  # type: ignore[no-untyped-def]
-    """Below which the distance between geom g and anything in a ball cannot lie."""
+def _compute_gap(rows: Array, center: Point, reach: float, g: int) -> float:
+    """Lower bound on the distance from geom g to anything in a ball."""
     if rows[g, KIND] == OTHER_KIND:
         d0 = center[0] - rows[g, POSITION]
         d1 = center[1] - rows[g, POSITION + 1]
         d2 = center[2] - rows[g, POSITION + 2]
-        return np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) - reach - rows[g, BOUND]
+        apart: float = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) - reach - rows[g, BOUND]
+        return apart
     distance, _, _, _ = measure(rows, g, center)
-    return distance - reach
+    gap: float = distance - reach
+    return gap
 
 
 @kernel
-def _queue_pairs(t, i, g, m, queued):  # type: ignore[no-untyped-def]
+def _queue_pairs(t: Tables, kind: int, i: int, g: int, m: int, queued: int) -> int:
     """Leaves robot i's geoms that may be the nearest to geom g to MuJoCo; returns how many are.
 
     The margin comes down to what it can be at most: the middle of a geom is within the geom.
     """
-    clearance = t.clearances[1] if m < t.starts[3] else t.clearances[3]
+    clearance = t.clearances[kind]
     hull = (t.hulls[i, 0], t.hulls[i, 1], t.hulls[i, 2])
-    if _find_gap(t.rows, hull, t.hulls[i, 3], g) >= t.margins[m] + clearance:
+    if _compute_gap(t.rows, hull, t.hulls[i, 3], g) >= t.margins[m] + clearance:
         return queued
     for a in range(t.robot_rows[i], t.robot_rows[i + 1]):
-        if m >= t.starts[4] and not t.obstacles[a, g]:
+        if kind == OBSTACLE and not t.obstacles[a, g]:
             continue
         center = (t.rows[a, POSITION], t.rows[a, POSITION + 1], t.rows[a, POSITION + 2])
-        gap = _find_gap(t.rows, center, t.rows[a, BOUND], g)
+        gap = _compute_gap(t.rows, center, t.rows[a, BOUND], g)
         if gap < t.margins[m] + clearance:
             t.near[queued, 0], t.near[queued, 1], t.near[queued, 2] = a, g, m
             t.gaps[queued] = gap
@@ -169,45 +242,51 @@ def _queue_pairs(t, i, g, m, queued):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure_bodies(t):  # type: ignore[no-untyped-def]
+def _measure_bodies(t: Tables) -> int:
     """Collisions and obstacles; returns how many pairs of geoms are left to MuJoCo."""
-    n, queued, m = t.own.shape[0], 0, t.starts[2]
+    n, queued, m = t.own.shape[0], 0, t.starts[COLLISION]
     for i in range(n):
         for j in range(i + 1, n):
             if t.upright[i] and t.upright[j]:
                 _measure_discs(t, i, j, m)
             else:
-                _put(t, m, t.sight - t.clearances[1], t.hulls[i], j)
+                _put(t, m, t.sight - t.clearances[COLLISION], t.hulls[i], j)
                 for g in range(t.robot_rows[j], t.robot_rows[j + 1]):
-                    queued = _queue_pairs(t, i, g, m, queued)
+                    queued = _queue_pairs(t, COLLISION, i, g, m, queued)
             m += 1
-    for i in range(t.starts[5] - t.starts[4]):
-        m = t.starts[4] + i
-        _put(t, m, t.sight - t.clearances[3], t.hulls[i], -1)
+    for i in range(t.starts[OBSTACLE + 1] - t.starts[OBSTACLE]):
+        m = t.starts[OBSTACLE] + i
+        _put(t, m, t.sight - t.clearances[OBSTACLE], t.hulls[i], -1)
         for g in range(t.robot_rows[n], t.rows.shape[0]):
-            queued = _queue_pairs(t, i, g, m, queued)
+            queued = _queue_pairs(t, OBSTACLE, i, g, m, queued)
     return queued
 
 
 @kernel
-def _measure_bounds(t, sites):  # type: ignore[no-untyped-def]
+def _measure_bounds(t: Tables, sites: Array) -> None:
     """Per robot: how far its site is inside the bounds, negative outside."""
-    for i in range(t.starts[4] - t.starts[3]):
+    for i in range(t.starts[BOUNDS + 1] - t.starts[BOUNDS]):
         inside, square = np.inf, 0.0
         for c in range(3):
             gap = min(sites[i, c] - t.bounds[0, c], t.bounds[1, c] - sites[i, c])
             inside = min(inside, gap)
             square += min(gap, 0.0) ** 2
         distance = inside if inside >= 0.0 else -np.sqrt(square)
-        _put(t, t.starts[3] + i, distance - t.clearances[2], sites[i], -1)
+        _put(t, t.starts[BOUNDS] + i, distance - t.clearances[BOUNDS], sites[i], -1)
 
 
 @kernel
-def measure_margins(t, line, tensions, sites, poses):  # type: ignore[no-untyped-def]
+def measure_margins(
+    t: Tables,
+    line: tuple[Array, Array],
+    tensions: Array,
+    sites: Array,
+    poses: tuple[Array, Array],
+) -> int:
     """Writes all margins with their places.
 
     Args:
-        t: Tables (margin_tables.py); `rows` and everything after `obstacles` in it is written.
+        t: `rows` and everything after `obstacles` in it is written.
         line: arc lengths (K + 1,), m, and coefficients (K, 4, 3), m, of the centre line.
         tensions: at `samples` (T,), N.
         sites: where robots and source hold the hose (N + 1, 3), m.
@@ -222,4 +301,5 @@ def measure_margins(t, line, tensions, sites, poses):  # type: ignore[no-untyped
     _measure_stretch(t, arcs, coefficients, tensions)
     _measure_run_over(t, arcs, coefficients)
     _measure_bounds(t, sites)
-    return _measure_bodies(t)
+    queued: int = _measure_bodies(t)
+    return queued

@@ -2,33 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import combinations, pairwise
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hose_mj.constraints import margin_kernels as kernels
-from hose_mj.constraints.breaks import (
-    BOUNDS,
-    COLLISION,
-    KINDS,
-    OBSTACLE,
-    RUN_OVER,
-    STRETCH,
-    UNITS,
-    Break,
-)
-from hose_mj.constraints.footprints import find_footprint, find_obstacles
-from hose_mj.constraints.hose_probe import HoseProbe
+from hose_mj.constraints.footprints import Footprint, HoseProbe, find_obstacles, make_footprint
+from hose_mj.constraints.hose_distance import BALL
+from hose_mj.constraints.kinds import KIND_OF, KINDS, OBSTACLE, RUN_OVER, Kind, Watched
 from hose_mj.constraints.limits import Limits
-from hose_mj.constraints.margin_tables import make_tables
-from hose_mj.hoses.geds.shapes import KIND
+from hose_mj.constraints.margin_kernels import OTHER_KIND, Ints, Tables, measure_margins
+from hose_mj.hoses.geds.shapes import (
+    BOUND,
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    KIND,
+    PLANE,
+    ROW,
+    SIZE,
+    SPHERE,
+)
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compile_notice
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.world import World
+
+_SIMPLE = (PLANE, SPHERE, CAPSULE, CYLINDER, BOX)
+_INSIDE = 1e-9
+"""Tension is sampled this part of a segment's length inside its ends, where it may jump."""
+
+
+@dataclass(frozen=True)
+class Break:
+    """A margin that fell below zero.
+
+    Attributes:
+        kind: name of one of `KINDS`.
+        robot: the robot's number; None for a stretched segment.
+        other: the segment (stretch, run-over), the other robot (collision), the obstacle's geom
+            (obstacle); None for bounds.
+        time: when the margin was zero (s).
+        place: where (3,), m, world frame.
+        margin: at the end of the step in which it was crossed, m, or N for stretch.
+        speed: how fast the margin fell in that step, m/s, or N/s for stretch; 0 for a margin that
+            was below zero from the start.
+    """
+
+    kind: str
+    robot: int | None
+    other: int | str | None
+    time: float
+    place: tuple[float, float, float]
+    margin: float
+    speed: float
+
+    def describe(self) -> str:
+        """One line of English."""
+        where = ", ".join(f"{x:.3f}" for x in self.place)
+        unit = KIND_OF[self.kind].unit
+        how = f"at {self.speed:.3g} {unit}/s" if self.speed > 0.0 else "from the start"
+        what = KIND_OF[self.kind].sentence.format(robot=self.robot, other=self.other)
+        return f"{self.time:.3f} s: {what} at ({where}) m, {how} ({self.margin:.3g} {unit})"
+
+    def to_record(self) -> dict[str, Any]:
+        """Plain JSON values, by the attributes' names."""
+        return {**asdict(self), "place": list(self.place)}
 
 
 @dataclass(frozen=True)
@@ -62,15 +105,22 @@ class Monitor:
 
     def __init__(self, world: World, limits: Limits | None = None) -> None:
         self.world, self.limits = world, limits or Limits()
-        self._footprints = [find_footprint(world, i) for i in range(world.n_robots)]
+        self._footprints = [make_footprint(world, i) for i in range(world.n_robots)]
         self._obstacles = find_obstacles(world, self._footprints, self.limits.ground)
+        watched = find_watched(world, self._obstacles[0])
+        # Of each margin: the place of its kind in KINDS, robot and other.
+        self._margins = [
+            (k, robot, other)
+            for k, kind in enumerate(KINDS)
+            for robot, other in kind.members(watched)
+        ]
         self._prepare(world.centre_line().arc_lengths)
-        self._pairs = list(combinations(range(world.n_robots), 2))
-        self.kinds = tuple(np.repeat(KINDS, np.diff(self._tables.starts)).tolist())
-        self.names = tuple(self._name(m) for m in range(len(self.kinds)))
-        self.units = tuple(UNITS[kind] for kind in self.kinds)
-        texts = self._make_limit_texts()
-        self.limit_texts = tuple(texts[kind] for kind in self.kinds)
+        self.kinds = tuple(KINDS[k].name for k, _, _ in self._margins)
+        self.names = tuple(_name_margin(*margin) for margin in self._margins)
+        self.units = tuple(KINDS[k].unit for k, _, _ in self._margins)
+        nearest = [self._tables.tension, *self._tables.clearances[1:]]
+        texts = [kind.limit.format(limit=most) for kind, most in zip(KINDS, nearest, strict=True)]
+        self.limit_texts = tuple(np.repeat(texts, np.diff(self._tables.starts)).tolist())
         self.breaks: tuple[Break, ...] = ()
         self._pending: tuple[Break, ...] = ()
         with compile_notice("margins of constraints"):
@@ -127,7 +177,7 @@ class Monitor:
         if not np.array_equal(line.arc_lengths, self._arcs):
             self._prepare(line.arc_lengths)
         t = self._tables
-        queued = kernels.measure_margins(
+        queued = measure_margins(
             *(t, (line.arc_lengths, line.coefficients), world.tension(t.samples)),
             *(world.site_positions(), (world.data.geom_xpos, world.data.geom_xmat)),
         )
@@ -143,20 +193,21 @@ class Monitor:
         ends, gaps = np.zeros(6), t.gaps[:queued]
         for q in np.argsort(gaps).tolist():
             a, b, m = t.near[q].tolist()
-            clearance = t.clearances[1 if m < t.starts[3] else 3]
+            kind = self._margins[m][0]
+            clearance = t.clearances[kind]
             most = t.margins[m] + clearance
             if gaps[q] >= most:
                 continue
             found = mujoco.mj_geomDistance(model, data, t.ids[a], t.ids[b], most, ends)
             if found < most:
                 t.margins[m], t.places[m] = found - clearance, 0.5 * (ends[:3] + ends[3:])
-                if m >= t.starts[4]:
+                if kind == OBSTACLE:
                     t.others[m] = b
 
     def _measure_probe(self, probe: HoseProbe, line: CentreLine) -> None:
         """Lets MuJoCo measure the hose's distance from geoms whose shape only it knows."""
-        t, clearance = self._tables, self._tables.clearances[0]
-        first, last = t.starts[1:3]
+        t, clearance = self._tables, self._tables.clearances[RUN_OVER]
+        first, last = t.starts[RUN_OVER : RUN_OVER + 2]
         for i, near in enumerate(
             probe.measure(self.world.data, line, t.margins[first:last] + clearance)
         ):
@@ -170,50 +221,156 @@ class Monitor:
         fall, step = before.margins[m] - now.margins[m], now.time - before.time
         part = before.margins[m] / fall if fall > 0.0 else 1.0
         place = before.places[m] + part * (now.places[m] - before.places[m])
-        kind, (robot, other) = self.kinds[m], self._find_members(m)
-        if kind == RUN_OVER:
-            other = int(now.others[m])
-        elif kind == OBSTACLE:
-            other = self._name_geom(int(self._tables.ids[now.others[m]]))
+        number, robot, other = self._margins[m]
+        kind, found = KINDS[number], int(now.others[m])
         return Break(
-            *(kind, robot, other, float(before.time + part * step)),
+            *(kind.name, robot, self._name_other(kind, found) if other is None else other),
+            float(before.time + part * step),
             *(tuple(place.tolist()), float(now.margins[m])),
             speed=float(fall / step) if step > 0.0 else 0.0,
         )
 
-    def _find_members(self, m: int) -> tuple[int | None, int | str | None]:
-        """Robot and other of a margin, as far as they are always the same."""
-        kind = self.kinds[m]
-        number = m - int(self._tables.starts[KINDS.index(kind)])
-        if kind == STRETCH:
-            return None, number
-        return self._pairs[number] if kind == COLLISION else (number, None)
-
-    def _name(self, m: int) -> str:
-        robot, other = self._find_members(m)
-        numbers = [str(n) for n in (robot, other) if n is not None]
-        return f"{self.kinds[m]} {'-'.join(numbers)}"
-
-    def _name_geom(self, geom: int) -> str:
-        model = self.world.model
+    def _name_other(self, kind: Kind, found: int) -> int | str | None:
+        """Says what the other party of a break is called where it differs from break to break."""
+        if kind.other != "geom":
+            return found if kind.other else None
+        model, geom = self.world.model, int(self._tables.ids[found])
         body = model.body(model.geom_bodyid[geom]).name
         return str(model.geom(geom).name) or f"geom {geom} of {body}"
-
-    def _make_limit_texts(self) -> dict[str, str]:
-        near, apart, inside, clear = self._tables.clearances
-        return {
-            STRETCH: f"tension at most {self._tables.tension:.4g} N",
-            RUN_OVER: f"hose's surface at least {near:.3g} m away",
-            COLLISION: f"robots at least {apart:.3g} m apart",
-            BOUNDS: f"at least {inside:.3g} m inside the bounds",
-            OBSTACLE: f"obstacles at least {clear:.3g} m away",
-        }
 
     def _make_probe(self, arcs: Array) -> HoseProbe | None:
         """A probe for those geoms of robots that the kernels cannot measure, where there are."""
         t = self._tables
         strange = [
-            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == kernels.OTHER_KIND]
+            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == OTHER_KIND]
             for low, high in pairwise(t.robot_rows)
         ]
         return HoseProbe(self.world.model, strange, t.own, t.radius, arcs) if any(strange) else None
+
+
+def make_tables(
+    world: World,
+    limits: Limits,
+    footprints: Sequence[Footprint],
+    obstacles: tuple[Ints, NDArray[np.bool_]],
+    arcs: Array,
+) -> Tables:
+    """Makes the tables; see `Tables`.
+
+    Args:
+        world: to be measured.
+        limits: what its margins are measured against.
+        footprints: of its robots.
+        obstacles: as `find_obstacles` returns them.
+        arcs: ends of the pieces of its centre line (K + 1,), m.
+    """
+    n, spec = world.n_robots, world.scene.spec
+    geoms, may_hit = obstacles
+    ids = np.concatenate([*(footprint.geoms for footprint in footprints), geoms])
+    counts = np.cumsum([0, *(len(footprint.geoms) for footprint in footprints)])
+    watched = find_watched(world, geoms)
+    starts = np.cumsum([0, *(len(kind.members(watched)) for kind in KINDS)])
+    size = int(starts[-1])
+    # The tip's is L up to rounding.
+    attachments = np.clip(world.arc_lengths, arcs[0], arcs[-1])
+    parts, part_ends = split_hose(arcs, attachments)
+    samples, sample_segments = place_samples(arcs, attachments)
+    own_arcs = np.array([limits.compute_own_arc(footprint.radius) for footprint in footprints])
+    may_meet = np.zeros((counts[-1], len(ids)), dtype=np.bool_)
+    may_meet[:, counts[-1] :] = may_hit
+    room = int(counts[-1]) * len(ids)
+    gravity = float(np.linalg.norm(world.model.opt.gravity))
+    return Tables(
+        radius=spec.outer_radius,
+        tension=limits.compute_tension_limit(spec, gravity),
+        stiffness=spec.axial_stiffness,
+        lengthening=limits.max_lengthening,
+        sight=limits.compute_sight(max(footprint.radius for footprint in footprints)),
+        clearances=np.array([kind.clearance(limits, spec.outer_radius) for kind in KINDS]),
+        bounds=np.array(world.scene.bounds),
+        starts=starts,
+        segments=attachments,
+        own=attachments[:-1, None] + own_arcs[:, None] * [-1.0, 1.0],
+        samples=samples,
+        sample_segments=sample_segments,
+        parts=parts,
+        part_ends=part_ends,
+        rows=_make_rows(world, ids),
+        ids=ids,
+        robot_rows=counts,
+        upright=np.array([footprint.upright for footprint in footprints]),
+        obstacles=may_meet,
+        balls=np.zeros((len(arcs) - 1, BALL)),
+        hulls=np.zeros((n, 4)),
+        near=np.zeros((room, 3), dtype=np.int64),
+        gaps=np.zeros(room),
+        margins=np.zeros(size),
+        places=np.zeros((size, 3)),
+        others=np.zeros(size, dtype=np.int64),
+    )
+
+
+def find_watched(world: World, obstacles: Ints) -> Watched:
+    """Returns what decides which margins there are; `obstacles` (H,) are geoms."""
+    has_bounds = bool(np.any(np.isfinite(world.scene.bounds)))
+    return Watched(world.n_robots, has_bounds, len(obstacles) > 0)
+
+
+def _name_margin(k: int, robot: int | None, other: int | None) -> str:
+    numbers = [str(n) for n in (robot, other) if n is not None]
+    return f"{KINDS[k].name} {'-'.join(numbers)}"
+
+
+def split_hose(arcs: Array, attachments: Array) -> tuple[Ints, Array]:
+    """Cuts the hose at the ends of pieces and at the attachments.
+
+    Args:
+        arcs: ends of the pieces (K + 1,), m.
+        attachments: of robots, tip first, and source (N + 1,), m.
+
+    Returns:
+        piece and segment (P, 2), and where each part begins and ends within its piece (P, 2).
+    """
+    cuts = np.unique(np.concatenate([arcs, attachments]))
+    cuts = cuts[cuts <= attachments[0]]
+    middles = 0.5 * (cuts[:-1] + cuts[1:])
+    pieces = np.searchsorted(arcs, middles) - 1
+    ends = np.stack([cuts[:-1], cuts[1:]], axis=1) - arcs[pieces, None]
+    parts = np.stack([pieces, _find_segments(middles, attachments)], axis=1)
+    return parts.astype(np.int64), ends / np.diff(arcs)[pieces, None]
+
+
+def place_samples(arcs: Array, attachments: Array) -> tuple[Array, Ints]:
+    """Chooses arc lengths between which every model's tension is a straight line.
+
+    Tension is known at the joints of a cable, the middles of a flex's edges and of a spline's
+    spans: ends and middles of pieces, and just inside the ends of the segments.
+
+    Returns:
+        arc lengths (T,), m, and the segment of each (T,).
+    """
+    known = np.concatenate([arcs, 0.5 * (arcs[:-1] + arcs[1:])])
+    inside = [
+        np.array([low + _INSIDE * (high - low), high - _INSIDE * (high - low)])
+        for high, low in pairwise(attachments)
+    ]
+    between = known[(known > attachments[-1]) & (known < attachments[0])]
+    samples = np.sort(np.concatenate([*inside, between[~np.isin(between, attachments)]]))
+    return samples, _find_segments(samples, attachments)
+
+
+def _find_segments(places: Array, attachments: Array) -> Ints:
+    """Returns the segment of each arc length: segment i ends at attachment i."""
+    found = len(attachments) - 1 - np.searchsorted(attachments[::-1], places)
+    return np.asarray(found, dtype=np.int64)
+
+
+def _make_rows(world: World, ids: Ints) -> Array:
+    """Makes the rows of geoms (G, ROW), without their poses."""
+    model = world.model
+    rows = np.zeros((len(ids), ROW))
+    kinds = model.geom_type[ids]
+    rows[:, KIND] = np.where(np.isin(kinds, _SIMPLE), kinds, OTHER_KIND)
+    rows[:, SIZE : SIZE + 3] = model.geom_size[ids]
+    rows[:, BOUND] = np.where(kinds == PLANE, 0.0, model.geom_rbound[ids])
+    return rows

@@ -45,7 +45,7 @@ class Ending:
     least: tuple[dict[str, float], ...]
 
     def agrees(self, other: Ending) -> bool:
-        """Whether both ended alike: the same kind, the same robot out of the same cell."""
+        """Says whether both ended alike: the same kind, the same robot out of the same cell."""
         return (self.kind, self.robot, self.cell) == (other.kind, other.robot, other.cell)
 
     @classmethod
@@ -80,7 +80,7 @@ def play_sequence(monitor: Monitor, moves: Sequence[Move]) -> Ending:
     kinds = {kind: np.array(monitor.kinds) == kind for kind in dict.fromkeys(monitor.kinds)}
     least: list[dict[str, float]] = []
     for turn, (robot, action) in enumerate(moves):
-        x, y = actions.find_cells()[robot, :2].tolist()
+        x, y = actions.compute_cells()[robot, :2].tolist()
         lowest = monitor.measure()
         actions.begin(robot, action)
         kind, text = None, ""
@@ -105,7 +105,7 @@ def play_all(
     make_world: Callable[[], World],
     sequences: Sequence[Sequence[Move]],
     limits: Limits,
-    kept: Kept,
+    kept: EndingsFile,
     advance: Callable[[int], None],
 ) -> list[Ending]:
     """Plays all sequences that are not kept yet, and keeps each.
@@ -130,7 +130,7 @@ def play_all(
 
 
 @dataclass(frozen=True)
-class Kept:
+class EndingsFile:
     """Endings of one model in a file, so that a command that was stopped goes on.
 
     Attributes:

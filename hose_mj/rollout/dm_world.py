@@ -13,20 +13,24 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from dm_control import mujoco as dm_mujoco
-from dm_control.mujoco.wrapper import MjData
-from dm_control.rl import control
-from dm_env import specs
 
-from hose_mj.constraints.breaks import Break
-from hose_mj.constraints.monitor import Monitor
+from hose_mj.constraints.monitor import Break, Monitor
 from hose_mj.errors import InputError
+from hose_mj.extras import MissingExtra
 from hose_mj.hoses.protocol import Array
-from hose_mj.rollout.drawing import color_pieces
 from hose_mj.rollout.episode import is_at_goal
+from hose_mj.rollout.video import color_pieces
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.registry import make_world
 from hose_mj.world.world import World
+
+try:
+    from dm_control import mujoco as dm_mujoco
+    from dm_control.mujoco.wrapper import MjData
+    from dm_control.rl import control
+    from dm_env import specs
+except ImportError as error:
+    raise MissingExtra("cable", "a world as a dm_control environment") from error
 
 HOSE = "shown_hose/"
 """Prefix of the bodies that show a hose that is not part of MuJoCo's model."""
@@ -56,7 +60,7 @@ class WorldPhysics(dm_mujoco.Physics):
         self.broken: Break | None = None
         self._shows_hose = world.hose_model not in ("cable", "flex")
         self._arcs = np.linspace(0.0, world.scene.spec.length, N_PIECES + 1)
-        self._limit = monitor.limits.find_tension(
+        self._limit = monitor.limits.compute_tension_limit(
             world.scene.spec, float(np.linalg.norm(world.model.opt.gravity))
         )
         model = _compile_shown(world.scene) if self._shows_hose else world.model
@@ -130,7 +134,7 @@ class WorldPhysics(dm_mujoco.Physics):
         data.qpos[:], data.qvel[:] = world.data.qpos, world.data.qvel
         data.ctrl[:], data.time = world.control, world.time
         if self._shows_hose:
-            points = world.position(self._arcs)
+            points = world.hose_position(self._arcs)
             steps = np.diff(points, axis=0)
             data.mocap_pos[self._mocaps] = 0.5 * (points[1:] + points[:-1])
             for mocap, step in zip(self._mocaps, steps, strict=True):
@@ -166,7 +170,7 @@ class WorldTask(control.Task):
             "positions": world.site_positions(),
             "velocities": world.site_velocities(),
             "goal": world.goal_position(),
-            "hose": world.position(arcs),
+            "hose": world.hose_position(arcs),
             "margins": physics.monitor.measure(),
         }
 

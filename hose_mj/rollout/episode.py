@@ -8,12 +8,11 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from hose_mj.constraints.breaks import Break
-from hose_mj.constraints.monitor import Monitor
+from hose_mj.constraints.monitor import Break, Monitor
 from hose_mj.errors import InputError
 from hose_mj.world.world import World
 
-Ending = Literal["break", "goal", "duration"]
+EndedBy = Literal["break", "goal", "duration"]
 SAMPLE_RATE = 25.0
 """Samples per simulated second: what a film shows."""
 
@@ -36,7 +35,7 @@ class Policy(Protocol):
         ...
 
     def describe(self) -> Mapping[str, Any]:
-        """What it does now, all optional.
+        """Says what it does now, all optional.
 
         `turn` (its number), `owner` (the name of the robot whose turn it is), `action`, `vetoed`
         (names of actions), `stalled` (actions given up so far).
@@ -61,14 +60,14 @@ class Observer(Protocol):
         """
         ...
 
-    def finish(self, outcome: Outcome) -> None:
+    def finish(self, outcome: EpisodeResult) -> None:
         """Called once, after the last sample."""
         ...
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How an episode ended.
+class EpisodeResult:
+    """How an episode ended, and how long it took.
 
     Attributes:
         steps: of the world.
@@ -80,13 +79,13 @@ class Outcome:
 
     steps: int
     sim_time: float
-    ended_by: Ending
+    ended_by: EndedBy
     broken: Break | None
     stalled: int
 
 
 def is_at_goal(world: World) -> bool:
-    """Whether the tip's robot is within half a cell of the goal, in x and y.
+    """Says whether the tip's robot is within half a cell of the goal, in x and y.
 
     Where the goal is a cell's centre, as on the shipped floors, the two share a cell. A goal in the
     air, more than a cell above or below the robot, counts only within half a cell's height too.
@@ -106,7 +105,7 @@ def run_episode(
     sample_rate: float = SAMPLE_RATE,
     generator: np.random.Generator | None = None,
     settings: Mapping[str, Any] | None = None,
-) -> Outcome:
+) -> EpisodeResult:
     """Runs one episode from the world's present state.
 
     Args:
@@ -133,7 +132,7 @@ def run_episode(
     begun, steps, sampled = world.time, 0, 0
     most = max(1, round(duration / world.timestep))
     broken: Break | None = None
-    ended_by: Ending | None = None
+    ended_by: EndedBy | None = None
     _sample(observers, world, monitor, policy)
     while ended_by is None:
         policy.update()
@@ -151,7 +150,7 @@ def run_episode(
             sampled = due
             _sample(observers, world, monitor, policy)
     stalled = int(policy.describe().get("stalled", 0))
-    outcome = Outcome(steps, world.time - begun, ended_by, broken, stalled)
+    outcome = EpisodeResult(steps, world.time - begun, ended_by, broken, stalled)
     for observer in observers:
         observer.finish(outcome)
     return outcome

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from hose_mj.hoses.protocol import Array
-from hose_mj.world.motors import Indices
 from hose_mj.world.world import World
 
 
@@ -62,15 +62,15 @@ class Obstacles:
         return bool(self._data.geom_xmat[geom, 8] > 0.7)
 
 
-def find_solid(world: World, bodies: Indices) -> Indices:
+def find_solid(world: World, bodies: NDArray[np.int64]) -> NDArray[np.int64]:
     """The geoms of some bodies that collide with anything."""
     model = world.model
     solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     return np.flatnonzero(solid & np.isin(model.geom_bodyid, bodies))
 
 
-def find_footprint(world: World, robot: int) -> float:
-    """Radius (m) around its site within which a robot's colliding geoms lie, seen from above."""
+def compute_reach(world: World, robot: int) -> float:
+    """Returns how far (m) a robot's colliding geoms reach around its site, seen from above."""
     model, data = world.model, world.data
     site = data.site_xpos[world.sites[robot], :2]
     reach = 0.0

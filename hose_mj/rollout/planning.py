@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 
 from hose_mj.hoses.protocol import Array
-from hose_mj.rollout.obstacles import Obstacles, find_footprint
+from hose_mj.rollout.obstacles import Obstacles, compute_reach
 from hose_mj.rollout.scripts import Script, relax
-from hose_mj.world.actions import find_cells, find_centres
+from hose_mj.world.actions import compute_cells, compute_centres
 from hose_mj.world.driving import Driver
 
 Cell = tuple[int, int, int]
@@ -20,7 +20,7 @@ _CLEARANCE = 0.15
 """Distance kept to obstacles, as a share of a cell."""
 
 
-class Cells:
+class FreeCells:
     """The cells in which the tip's robot may be while nothing else moves.
 
     Args:
@@ -35,7 +35,7 @@ class Cells:
         self._spatial = bool(driver.axes[0] == 3)
         self._obstacles = Obstacles(world, 0)
         self._site, self._start = world.site_positions()[0], start
-        self._radius = find_footprint(world, 0)
+        self._radius = compute_reach(world, 0)
         self._held, self._apart = self._list_held(hose)
         self._known: dict[Cell, bool] = {}
 
@@ -43,20 +43,20 @@ class Cells:
         """Points that are held, and how far the tip's site has to stay from each."""
         world = self._world
         others = world.site_positions()[1:-1]
-        apart = [self._radius + find_footprint(world, k) for k in range(1, world.n_robots)]
+        apart = [self._radius + compute_reach(world, k) for k in range(1, world.n_robots)]
         if not hose:
             return others, np.array(apart)
         length = world.scene.spec.length
         arcs = np.linspace(0.0, length, HOSE_SAMPLES)
         own = np.maximum(3.0 * self._radius, 0.5 * (length - world.arc_lengths[1]))
-        covered = world.position(arcs[arcs < world.arc_lengths[0] - own])
+        covered = world.hose_position(arcs[arcs < world.arc_lengths[0] - own])
         wide = np.full(len(covered), self._radius + world.scene.spec.outer_radius)
         return np.concatenate([others, covered]), np.concatenate([apart, wide])
 
     def is_free(self, cell: Cell) -> bool:
-        """Whether the tip's robot fits there."""
+        """Says whether the tip's robot fits there."""
         if cell not in self._known:
-            self._known[cell] = self._fits(find_centres(self._world, cell))
+            self._known[cell] = self._fits(compute_centres(self._world, cell))
         return self._known[cell]
 
     def _fits(self, place: Array) -> bool:
@@ -105,7 +105,7 @@ class Cells:
         return True
 
     def _cell_of(self, place: Array) -> Cell:
-        x, y, z = (int(c) for c in find_cells(self._world, place))
+        x, y, z = (int(c) for c in compute_cells(self._world, place))
         return x, y, z if self._spatial else 0
 
     def find_goal(self) -> Cell:
@@ -114,7 +114,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Plan:
+class GoalPlan:
     """How the tip is brought to the goal.
 
     Attributes:
@@ -143,11 +143,11 @@ class Plan:
         n, source = world.n_robots, world.site_positions()[-1]
         spans = self.slack * -np.diff(world.arc_lengths)
         places = self._rise(driver)
-        cells = Cells(driver, places[0], hose=self.avoid)
+        cells = FreeCells(driver, places[0], hose=self.avoid)
         path = cells.find_path(cells.find_goal())
         if path is None:
             return None
-        way = find_centres(world, np.array(path[1:] or path))
+        way = compute_centres(world, np.array(path[1:] or path))
         way[-1] = world.goal_position()
         if driver.axes[0] != 3:
             way[:, 2] = places[0, 2]
@@ -166,7 +166,7 @@ class Plan:
         return Script(0, np.array(formations), self.pace)
 
     def _rise(self, driver: Driver) -> Array:
-        """Where the robots are once they have risen (N, 3), m."""
+        """Returns where the robots are once they have risen (N, 3), m."""
         world = driver.world
         places = world.site_positions()[:-1]
         size, spatial = world.scene.cell_size, driver.axes == 3

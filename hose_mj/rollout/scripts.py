@@ -1,13 +1,20 @@
-"""`Script`: formations that robots go through one after the other; `Player` drives them."""
+"""`Script`: formations that robots go through, `Player` drives them, and what may break what.
+
+`list_*` list scripts that may break a constraint of a kind (kinds.py names them in the kind's row),
+the likeliest first, from a scene's geometry.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
 from hose_mj.hoses.protocol import Array
+from hose_mj.rollout.obstacles import Obstacles, compute_reach
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
@@ -108,3 +115,199 @@ def _interpolate(time: float, times: Array, formations: Sequence[Array] | Array)
     span = times[k] - times[k - 1]
     share = min(1.0, (time - times[k - 1]) / span) if span > 0.0 else 1.0
     return np.asarray((1.0 - share) * formations[k - 1] + share * formations[k])
+
+
+_ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
+_DETOURS = tuple(math.radians(a) for a in (30, -30, 60, -60))
+_BEYOND = 1.5
+"""How much farther than a segment is long its ends are driven apart."""
+_BEHIND = 0.5
+"""How far behind an obstacle or a bound a robot is driven, in cells."""
+_SLACK = 0.95
+"""Share of a segment that neighbours may be apart where some follow another."""
+_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)
+"""Where along a segment it is run over, the middle first."""
+
+
+def list_stretches(driver: Driver) -> list[Script]:
+    """Two neighbours driven apart, by one of them or by both; or the last robot from the source."""
+    world = driver.world
+    sites, arcs = world.site_positions(), world.arc_lengths
+    found = []
+    for robot in range(world.n_robots):
+        here, there = sites[robot], sites[robot + 1]
+        far = _BEYOND * (arcs[robot] - arcs[robot + 1])
+        for angle in _ANGLES:
+            away = _turn(_point(there, here), angle)
+            scripts = [move(world, robot, {robot: there + far * away})]
+            if robot + 1 < world.n_robots:
+                middle, half = 0.5 * (here + there), 0.5 * far * away
+                both = {robot: middle + half, robot + 1: middle - half}
+                scripts.append(move(world, robot, both))
+            found += scripts
+    return _sort(driver, found, room=1.0 / _BEYOND)
+
+
+def list_run_overs(driver: Driver) -> list[Script]:
+    """A robot driven across each segment, at several places, those it does not hold first.
+
+    Each way is taken alone, then with the others following so that segments stay slack.
+    """
+    world = driver.world
+    sites, arcs = world.site_positions(), world.arc_lengths
+    found: list[tuple[int, float, Script]] = []
+    for robot in range(world.n_robots):
+        radius = compute_reach(world, robot)
+        for segment in range(world.n_robots):
+            own = segment in (robot, robot - 1)
+            for share in _SHARES:
+                arc = arcs[segment + 1] + share * (arcs[segment] - arcs[segment + 1])
+                if abs(arc - arcs[robot]) < 4.0 * radius:
+                    continue
+                point = _level(driver, robot, world.hose_position(arc)[0])
+                across = point + 2.0 * radius * _point(sites[robot], point)
+                distance = float(np.linalg.norm(point - sites[robot]))
+                found.append((own, distance, move(world, robot, {robot: across})))
+    alone = [script for _, _, script in sorted(found, key=lambda item: item[:2])]
+    return [way for script in alone for way in (script, _follow(driver, script))]
+
+
+def list_collisions(driver: Driver) -> list[Script]:
+    """A robot driven at another, straight or from a side; robots that share no segment first."""
+    world = driver.world
+    sites = world.site_positions()
+    found: list[tuple[int, float, Script]] = []
+    for robot, other in permutations(range(world.n_robots), 2):
+        here, there = sites[robot], _level(driver, robot, sites[other])
+        apart = compute_reach(world, robot) + compute_reach(world, other)
+        distance = float(np.linalg.norm(there - here))
+        for k, angle in enumerate(_ANGLES):
+            if angle == 0.0:
+                script = move(world, robot, {robot: there})
+            else:
+                beside = there + 1.5 * apart * _turn(_point(there, here), angle)
+                script = move(world, robot, {robot: beside}, {robot: there})
+            found.append((k // 2, distance, script))
+    return [script for _, _, script in sorted(found, key=lambda item: item[:2])]
+
+
+def list_exits(driver: Driver) -> list[Script]:
+    """A robot driven out of the bounds, the nearest first."""
+    world = driver.world
+    sites = world.site_positions()
+    found: list[tuple[float, Script]] = []
+    for robot in range(world.n_robots):
+        for axis in range(driver.axes[robot]):
+            for bound, sense in zip(world.scene.bounds, (-1.0, 1.0), strict=True):
+                if math.isfinite(bound[axis]):
+                    distance = abs(bound[axis] - sites[robot, axis])
+                    step = np.zeros(3)
+                    step[axis] = sense * (distance + _BEHIND * world.scene.cell_size)
+                    found += _list_ways(driver, robot, step)
+    return [script for _, script in sorted(found, key=lambda item: item[0])]
+
+
+def list_obstacle_hits(driver: Driver) -> list[Script]:
+    """A robot driven at an obstacle, the nearest first; straight, or from a side.
+
+    From a side, since straight ahead the hose may lie between the two and be squeezed.
+    """
+    world = driver.world
+    found: list[tuple[float, Script]] = []
+    for robot in range(world.n_robots):
+        obstacles = Obstacles(world, robot)
+        for geom in obstacles.others:
+            _, towards = obstacles.find(int(geom), np.zeros(3), world.scene.spec.length)
+            towards[driver.axes[robot] :] = 0.0
+            length = float(np.linalg.norm(towards))
+            if length > 0.0:
+                step = towards * (1.0 + _BEHIND * world.scene.cell_size / length)
+                found += _list_ways(driver, robot, step)
+                found += _list_detours(driver, robot, step)
+    return [script for _, script in sorted(found, key=lambda item: item[0])]
+
+
+def _list_ways(driver: Driver, robot: int, step: Array) -> list[tuple[float, Script]]:
+    """A robot moves by a step, alone or with others so that segments stay slack; and how far."""
+    world = driver.world
+    sites = world.site_positions()
+    distance = float(np.linalg.norm(step))
+    alone = move(world, robot, {robot: sites[robot] + step})
+    spans = -np.diff(world.arc_lengths)
+    ways = [(distance, alone)]
+    for cost, slack, pace in ((1.2, 0.9, 1.0), (2.0, 0.75, 1.0), (2.5, 0.9, 0.5)):
+        together = relax(alone.formations[0], robot, sites[-1], slack * spans)
+        ways.append((cost * distance, Script(robot, together[None], pace)))
+    return ways
+
+
+def _follow(driver: Driver, script: Script) -> Script:
+    """The same with the other robots drawn after the one it is about."""
+    source, spans = driver.world.site_positions()[-1], -_SLACK * np.diff(driver.world.arc_lengths)
+    drawn = [relax(places, script.robot, source, spans) for places in script.formations]
+    return Script(script.robot, np.array(drawn), script.pace)
+
+
+def _list_detours(driver: Driver, robot: int, step: Array) -> list[tuple[float, Script]]:
+    """A robot moves by a step, but ends it from a side; and how far, the turns counted double."""
+    world = driver.world
+    sites = world.site_positions()
+    end = sites[robot] + step
+    ways = []
+    for angle in _DETOURS:
+        beside = end - _turn(step, angle)
+        script = move(world, robot, {robot: beside}, {robot: end})
+        first, length = (float(np.linalg.norm(v)) for v in (beside - sites[robot], step))
+        ways.append((2.0 * first + length, script))
+    return ways
+
+
+def _sort(driver: Driver, scripts: list[Script], room: float) -> list[Script]:
+    """Scripts that stay in the bounds and clear of others first, then short ones."""
+    world = driver.world
+    sites = world.site_positions()[:-1]
+    low, high = (np.array(bound) for bound in world.scene.bounds)
+
+    def rate(script: Script) -> tuple[int, float]:
+        last = script.formations[-1]
+        moved = np.linalg.norm(last - sites, axis=1)
+        ends = sites + room * (last - sites)
+        out = bool(np.any(ends < low) or np.any(ends > high))
+        return int(out) + _count_meetings(world, script, room), float(moved.max())
+
+    return sorted(scripts, key=rate)
+
+
+def _count_meetings(world: World, script: Script, room: float) -> int:
+    """Counts how many pairs of robots come too close on the way of a script with one formation."""
+    sites = world.site_positions()[:-1]
+    reach = [compute_reach(world, k) for k in range(world.n_robots)]
+    steps = room * (script.formations[-1] - sites)
+    count = 0
+    for i in range(world.n_robots):
+        for j in range(i + 1, world.n_robots):
+            shares = np.linspace(0.0, 1.0, 17)[:, None]
+            apart = sites[i] - sites[j] + shares * (steps[i] - steps[j])
+            near = np.linalg.norm(apart[:, :2], axis=1).min()
+            count += bool(near < reach[i] + reach[j] and np.any(steps[[i, j]]))
+    return count
+
+
+def _level(driver: Driver, robot: int, point: Array) -> Array:
+    """A point at the height of a robot that is driven in the plane."""
+    if driver.axes[robot] == 3:
+        return point
+    return np.array([*point[:2], driver.targets[robot, 2]])
+
+
+def _point(start: Array, end: Array) -> Array:
+    """The unit vector from one point to another, along x where they are one."""
+    step = end - start
+    length = float(np.linalg.norm(step))
+    return step / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
+
+
+def _turn(vector: Array, angle: float) -> Array:
+    """A vector turned about the vertical."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]])

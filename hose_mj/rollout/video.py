@@ -1,4 +1,4 @@
-"""An episode as a film: MuJoCo draws the scene, the hose comes on top, coloured by its tension."""
+"""A hose in MuJoCo's own pictures, coloured by tension: in a viewer, or an episode as a film."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from numpy.typing import NDArray
 
 from hose_mj.errors import HoseError, InputError
@@ -17,9 +18,11 @@ from hose_mj.recording.files import make_temp_beside, replace_atomically
 from hose_mj.recording.palette import color_tension
 from hose_mj.recording.world_episode import WorldEpisode
 from hose_mj.scenes.mjcf.scene import Scene
+from hose_mj.world.world import World
 
 CAMERA = "overview"
 _MOST_SAMPLES = 4  # per pixel: more takes long where there is no graphics card
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 _BREAK_COLOR = (1.0, 0.15, 0.2, 1.0)
 
 
@@ -85,7 +88,7 @@ def render_frames(
     view = choose_camera(model, camera)
     n_frames = max(2, 1 + round((times[-1] - times[0]) * fps))
     chosen = np.searchsorted(times, np.linspace(times[0], times[-1], n_frames) - 1e-9)
-    stage = Puppets(model, episode)
+    bodies = PosedBodies(model, episode)
     try:
         renderer = mujoco.Renderer(model, size[1], size[0], max_geom=20_000)
     except Exception as error:  # each OpenGL backend has its own kinds
@@ -93,9 +96,9 @@ def render_frames(
         raise HoseError(f"MuJoCo cannot draw here ({error}); {remedy}") from error
     with renderer:
         for k in np.minimum(chosen, len(times) - 1):
-            stage.pose(int(k))
-            renderer.update_scene(stage.data, camera=view)
-            stage.draw_hose(renderer.scene, int(k))
+            bodies.pose(int(k))
+            renderer.update_scene(bodies.data, camera=view)
+            bodies.draw_hose(renderer.scene, int(k))
             yield np.asarray(renderer.render(), dtype=np.uint8)
 
 
@@ -109,7 +112,7 @@ def choose_camera(model: mujoco.MjModel, camera: str | None) -> Any:
     return camera
 
 
-class Puppets:
+class PosedBodies:
     """Puts a scene's bodies where a sample has them, without simulating anything.
 
     Args:
@@ -145,20 +148,17 @@ class Puppets:
     def draw_hose(self, scene: mujoco.MjvScene, k: int) -> None:
         """Adds the hose of sample k to a picture, and the break once it has happened."""
         episode, rows = self._episode, self._episode.samples.rows
-        stage, points = episode.scene, rows["hose"][k].astype(np.float64)
+        shown, points = episode.scene, rows["hose"][k].astype(np.float64)
         middle = 0.5 * (rows["tension"][k][:-1] + rows["tension"][k][1:])
-        colors = color_tension(middle, stage.tension_limit) / 255.0
+        colors = color_tension(middle, shown.tension_limit) / 255.0
         for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
-            geom = add_geom(scene, (*color, 1.0))
-            mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, stage.hose_radius, start, end)
+            add_capsule(scene, (*color, 1.0), shown.hose_radius, start, end)
         mark = episode.ending.mark
         if mark is not None and rows["time"][k] >= mark.time:
-            top = mark.place + np.array([0.0, 0.0, 0.16 * stage.size])
-            geom, radius = add_geom(scene, _BREAK_COLOR), 0.005 * stage.size
-            kind = mujoco.mjtGeom.mjGEOM_CAPSULE
-            mujoco.mjv_connector(geom, kind, radius, mark.place, top)
+            top = mark.place + np.array([0.0, 0.0, 0.16 * shown.size])
+            add_capsule(scene, _BREAK_COLOR, 0.005 * shown.size, mark.place, top)
             ball = add_geom(scene, _BREAK_COLOR)
-            kind, sizes = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014 * stage.size)
+            kind, sizes = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014 * shown.size)
             mujoco.mjv_initGeom(ball, kind, sizes, top, np.eye(3).ravel(), ball.rgba.copy())
 
 
@@ -168,7 +168,50 @@ def add_geom(scene: mujoco.MjvScene, color: tuple[float, ...] | Array) -> mujoco
         raise HoseError(f"the scene has more than {scene.maxgeom} geoms, too many for a film")
     geom = scene.geoms[scene.ngeom]
     rgba = np.asarray(color, dtype=np.float32)
-    kind = mujoco.mjtGeom.mjGEOM_CAPSULE
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+    mujoco.mjv_initGeom(geom, _CAPSULE, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
     scene.ngeom += 1
     return geom
+
+
+def add_capsule(
+    scene: mujoco.MjvScene,
+    color: tuple[float, ...] | Array,
+    radius: float,
+    start: Array,
+    end: Array,
+) -> None:
+    """Adds a capsule between two points (3,), m; `HoseError` if there are too many geoms."""
+    mujoco.mjv_connector(add_geom(scene, color), _CAPSULE, radius, start, end)
+
+
+N_PIECES = 80
+
+
+def draw_hose(scn: mujoco.MjvScene, world: World, limit: float, n_pieces: int = N_PIECES) -> int:
+    """Adds the hose of a world to the geoms of a scene.
+
+    Args:
+        scn: added to, behind what it holds: the `user_scn` of a passive viewer, or the scene of a
+            renderer after its update.
+        world: shown as it stands.
+        limit: the tension that is red (N).
+        n_pieces: capsules.
+
+    Returns:
+        How many capsules were added: fewer where the scene is full.
+    """
+    arcs = np.linspace(0.0, world.scene.spec.length, n_pieces + 1)
+    points = world.hose_position(arcs)
+    colors = color_pieces(world, arcs, limit)
+    n = int(min(n_pieces, scn.maxgeom - scn.ngeom))
+    for k in range(n):
+        add_capsule(scn, colors[k], world.scene.spec.outer_radius, points[k], points[k + 1])
+    return n
+
+
+def color_pieces(world: World, arcs: Array, limit: float) -> npt.NDArray[np.float32]:
+    """Red, green, blue, opacity from 0 to 1, float32 (k, 4), of the pieces between arc lengths."""
+    middles = 0.5 * (arcs[1:] + arcs[:-1])
+    colors = np.ones((len(middles), 4), np.float32)
+    colors[:, :3] = color_tension(world.tension(middles), limit) / 255.0
+    return colors

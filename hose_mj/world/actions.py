@@ -36,14 +36,14 @@ Mode = Literal["drive", "force"]
 Cells = npt.NDArray[np.int64]
 
 
-def find_cells(world: World, points: Array) -> Cells:
+def compute_cells(world: World, points: Array) -> Cells:
     """c(P) = round((P - source) / cell size) of points (..., 3), m."""
     source = world.data.site_xpos[world.sites[-1]]
     cells: Cells = np.round((points - source) / world.scene.cell_size).astype(np.int64)
     return cells
 
 
-def find_centres(world: World, cells: npt.ArrayLike) -> Array:
+def compute_centres(world: World, cells: npt.ArrayLike) -> Array:
     """The centres (..., 3), m, of cells (..., 3)."""
     source = world.data.site_xpos[world.sites[-1]]
     return np.asarray(source + np.asarray(cells) * world.scene.cell_size)
@@ -102,9 +102,9 @@ class Actions:
         """The actions that a robot has."""
         return self.names if self.driver.axes[robot] == 3 else self.names[:5]
 
-    def find_cells(self) -> Cells:
+    def compute_cells(self) -> Cells:
         """The robots' cells (N, 3)."""
-        return find_cells(self.world, self.world.site_positions()[:-1])
+        return compute_cells(self.world, self.world.site_positions()[:-1])
 
     def begin(self, robot: int, action: str) -> None:
         """Starts an action; one that still runs ends where its robot is.
@@ -125,7 +125,7 @@ class Actions:
             self.world.apply_force(robot, self._force * step)
         elif np.any(step):
             place = self.world.data.site_xpos[self.world.sites[robot]]
-            next_cell = find_centres(self.world, find_cells(self.world, place) + step)
+            next_cell = compute_centres(self.world, compute_cells(self.world, place) + step)
             moved = step != 0 if step[2] else np.array([True, True, False])
             self.driver.targets[robot] = np.where(moved, next_cell, self.driver.targets[robot])
 
@@ -138,7 +138,7 @@ class Actions:
             self.driver.rest(self.robot)
 
     def is_done(self) -> bool:
-        """Whether the action has ended, to be asked after each step."""
+        """Says whether the action has ended, to be asked after each step."""
         if self._runs and self.robot is not None:
             elapsed = self.world.time - self._begun
             if self.mode == "force":
@@ -153,9 +153,9 @@ class Actions:
         return not self._runs
 
     def _has_arrived(self, robot: int) -> bool:
-        if self.driver.find_error(robot) > self.tolerance:
+        if self.driver.compute_error(robot) > self.tolerance:
             return False
-        return self.driver.find_speed(robot) <= self.slowness
+        return self.driver.compute_speed(robot) <= self.slowness
 
     def describe(self) -> dict[str, Any]:
         """The turn, its owner and what it does, for recordings."""

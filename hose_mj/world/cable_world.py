@@ -15,8 +15,7 @@ from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
 from hose_mj.scenes.mjcf.scene import Scene
-from hose_mj.world.hose_contact import HoseContact
-from hose_mj.world.mujoco_scene import Numerics
+from hose_mj.world.mujoco_scene import HoseContact, Numerics
 from hose_mj.world.mujoco_world import MujocoWorld
 
 _SAFETY = 0.5
@@ -70,7 +69,7 @@ class CableWorld(MujocoWorld):
         self._kind = BallJoints(spec, twist)
         self._held = self._locate_holds(scene)
         if substeps is None:
-            stable = find_stable_step(spec, self._layout.segment_length, twist)
+            stable = compute_stable_step(spec, self._layout.segment_length, twist)
             most = min(_LONGEST, _SAFETY * stable)
             substeps = math.ceil(timestep / most * (1.0 - 1e-9))
         nodes = self._layout.nodes.copy()
@@ -118,7 +117,7 @@ class CableWorld(MujocoWorld):
         mujoco.mj_setConst(model, mujoco.MjData(model))
         model.stat.meaninertia = scale
 
-    def _lay(self, nodes: Array) -> None:
+    def _set_nodes(self, nodes: Array) -> None:
         frames = transport_frames(nodes, self._kind.base_frame)
         first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]
         qpos = self._kind.to_qpos(nodes[0], frames, rooted=False)
@@ -140,7 +139,7 @@ class CableWorld(MujocoWorld):
         return "try more substeps, fewer segments or a lower torsional stiffness"
 
 
-def find_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffness: float) -> float:
+def compute_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffness: float) -> float:
     """Largest stable step (s) of a free chain of rigid links with explicit joint stiffness.
 
     Undamped, 2 / omega for the fastest motion of bending or twist (docs/mujoco_cable.md, "Time

@@ -9,9 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.world.motors import Motors, find_motors
-from hose_mj.world.servos import ArmServo, SlideServo, find_axes, is_constant
-from hose_mj.world.wheels import WheelServo
+from hose_mj.world.servos import (
+    ArmServo,
+    Motors,
+    SlideServo,
+    WheelServo,
+    count_axes,
+    find_motors,
+    is_constant,
+)
 from hose_mj.world.world import World
 
 BANDWIDTH = 60.0
@@ -24,8 +30,8 @@ class Driver:
     """Drives all robots of a world, each by the servo that suits its motors.
 
     Robots whose motors move the site itself, pucks, carriers and arms, get a servo on the site
-    (servos.py), in x and y, and in z where the motors reach that far. Bases with two driven wheels
-    steer (wheels.py). Motors of a robot that its servo has no use for, and all other actuators,
+    in x and y, and in z where the motors reach that far. Bases with two driven wheels
+    steer. Motors of a robot that its servo has no use for, and all other actuators,
     keep the control that the user gives them.
 
     Args:
@@ -64,7 +70,7 @@ class Driver:
         for motors in self._motors:
             chain = motors.choose(motors.in_chain)
             wheels = motors.choose(~motors.in_chain)
-            axes = find_axes(world, chain)
+            axes = count_axes(world, chain)
             if axes:
                 self.axes[motors.robot] = axes
                 if is_constant(world, chain):
@@ -112,13 +118,13 @@ class Driver:
         """Lets a robot's motors do nothing in the next step."""
         self.world.control[self._motors[robot].ids] = 0.0
 
-    def find_error(self, robot: int) -> float:
-        """How far a robot's site is from its target, along the axes it is driven in (m)."""
+    def compute_error(self, robot: int) -> float:
+        """Returns how far a robot's site is from its target, along the axes it is driven in (m)."""
         axes, site = self.axes[robot], self.world.sites[robot]
         return float(np.linalg.norm((self.world.data.site_xpos[site] - self.targets[robot])[:axes]))
 
-    def find_speed(self, robot: int) -> float:
-        """How fast a robot's site moves, along the axes it is driven in (m/s)."""
+    def compute_speed(self, robot: int) -> float:
+        """Returns how fast a robot's site moves, along the axes it is driven in (m/s)."""
         world = self.world
         rows = np.zeros((3, world.model.nv))
         mujoco.mj_jacSite(world.model, world.data, rows, None, int(world.sites[robot]))

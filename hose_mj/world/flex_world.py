@@ -12,8 +12,7 @@ from hose_mj.hoses.mujoco.flex_rod import add_edges, make_rod
 from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf.scene import Scene
-from hose_mj.world.hose_contact import HoseContact
-from hose_mj.world.mujoco_scene import PREFIX, Numerics
+from hose_mj.world.mujoco_scene import PREFIX, HoseContact, Numerics
 from hose_mj.world.mujoco_world import MujocoWorld
 
 
@@ -78,7 +77,7 @@ class FlexWorld(MujocoWorld):
             maker.body(f"v{vertex}").add_site(name=f"hold{k}")
         return maker
 
-    def _lay(self, nodes: Array) -> None:
+    def _set_nodes(self, nodes: Array) -> None:
         first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]
         self.data.qpos[first : first + nodes.size] = (nodes - self._rest).ravel()
 

@@ -20,18 +20,16 @@ from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
-from hose_mj.world.coupling import Bodies
-from hose_mj.world.hose_touch import HoseTouch
-from hose_mj.world.initial_shape import count_control_points, relax_hose
-from hose_mj.world.measured_geoms import add_probe
-from hose_mj.world.planar_point_robots import Pucks
+from hose_mj.world.geds_contact import GedsContact, add_probe
+from hose_mj.world.initial_shape import count_control_points, relax_initial_shape
+from hose_mj.world.planar_point_robots import PlanarPointRobots
 from hose_mj.world.world import World
 
 GAP = 1e-6
-"""Largest distance of hose and site at the end of a step (m), where `MOST_SWEEPS` suffice."""
-MOST_SWEEPS = 10
+"""Largest distance of hose and site at the end of a step (m), where `MOST_ITERATIONS` suffice."""
+MOST_ITERATIONS = 10
 _SLOW = 5.0
-"""After a sweep that closes the gap by less than this factor the answer to it is corrected."""
+"""After an iteration that closes the gap by less than this factor the answer to it is corrected."""
 
 
 class GedsWorld(World):
@@ -48,7 +46,7 @@ class GedsWorld(World):
 
     Attributes:
         hose: the spline.
-        sweeps: how often hose and bodies were solved for one another so far.
+        coupling_iterations: how often hose and bodies were solved for one another so far.
 
     Raises:
         InputError: a value outside its valid set.
@@ -83,16 +81,18 @@ class GedsWorld(World):
             scheme=scheme,
             tolerance=1e-6,
         )
-        self.sweeps = 0
+        self.coupling_iterations = 0
         self._start_bodies()
-        self._touch = HoseTouch(self.model, self.data, self.hose, self.sites, self.arc_lengths)
-        self._touch.set_obstacles(scene.friction)
+        self._contact = GedsContact(self.model, self.data, self.hose, self.sites, self.arc_lengths)
+        self._contact.set_obstacles(scene.friction)
         self._bodies = Bodies(self.model, self.data, self.sites[:-1])
-        self._start = relax_hose(
+        self._start = relax_initial_shape(
             *(scene.spec, self.site_positions(), self.arc_lengths),
             *(self.hose.contacts.obstacles, self.hose.gravity, n),
         ).control_points
-        self._pucks = Pucks.find(self, self._touch) if compiled_pucks else None
+        self._point_robots = (
+            PlanarPointRobots.find(self, self.hose, self._contact) if compiled_pucks else None
+        )
         # The coefficients of the centre line are linear in the control points.
         unit = CentreLine.of_spline(*self.hose.weigh_spans())
         self._line = unit.arc_lengths, unit.coefficients.reshape(-1, n)
@@ -118,26 +118,26 @@ class GedsWorld(World):
             self.hose.attach(float(s), place)
             for s, place in zip(self.arc_lengths, self.site_positions(), strict=True)
         ]
-        self._touch.reset()
+        self._contact.reset()
 
     def step(self, n_steps: int = 1) -> None:
         """See `World.step`."""
         check_count("n_steps", n_steps, 0)
         while n_steps > 0:
             done = 0
-            if self._pucks is not None:
-                done = self._pucks.step(self._holds[:-1], n_steps)
+            if self._point_robots is not None:
+                done = self._point_robots.step(self._holds[:-1], n_steps)
             if done < n_steps:
                 self._step_bodies()
                 done += 1
             n_steps -= done
 
-    def position(self, arc_length: ArrayLike) -> Array:
-        """See `World.position`."""
+    def hose_position(self, arc_length: ArrayLike) -> Array:
+        """See `World.hose_position`."""
         return self.hose.position(arc_length)
 
-    def velocity(self, arc_length: ArrayLike) -> Array:
-        """See `World.velocity`."""
+    def hose_velocity(self, arc_length: ArrayLike) -> Array:
+        """See `World.hose_velocity`."""
         return self.hose.velocity(arc_length)
 
     def tension(self, arc_length: ArrayLike) -> Array:
@@ -157,14 +157,14 @@ class GedsWorld(World):
 
     def hose_snapshot(self) -> dict[str, Any]:
         """See `World.hose_snapshot`."""
-        return {"hose": self.hose.snapshot(), "touch": self._touch.snapshot()}
+        return {"hose": self.hose.snapshot(), "contact": self._contact.snapshot()}
 
     def restore_hose(self, state: dict[str, Any]) -> None:
         """See `World.restore_hose`."""
         self.hose.restore(state["hose"])
         self._holds = self.hose.holds
         self._update_poses()
-        self._touch.restore(state["touch"])
+        self._contact.restore(state["contact"])
 
     # -- inside ------------------------------------------------------------------------------------
 
@@ -172,11 +172,11 @@ class GedsWorld(World):
         """One step of hose and bodies, MuJoCo's step tried until they meet."""
         bodies, hose, held = self._bodies, self.hose, self._holds[:-1]
         self._write_inputs()
-        self._touch.push(self.data.qfrc_applied)
+        self._contact.push(self.data.qfrc_applied)
         bodies.begin()
-        self._touch.measure()
+        self._contact.measure()
         try:
-            self._meet(held)
+            self._couple(held)
         except StepError:
             bodies.take_back()
             raise
@@ -188,52 +188,161 @@ class GedsWorld(World):
             )
         hose.coupling.accept_step()
         bodies.end()
-        self._touch.update()
+        self._contact.update()
 
-    def _meet(self, held: Sequence[Hold]) -> None:
+    def _couple(self, held: Sequence[Hold]) -> None:
         """Finds the forces under which the steps of hose and bodies end with both together.
 
-        Each sweep solves the hose for a linear answer of the bodies: first the symmetric one, then
-        Newton's, and where contacts open or close so that this does not help, Newton's corrected
-        by what the bodies did answer (Broyden 1965).
+        Each iteration solves the hose for a linear answer of the bodies: first the symmetric one,
+        then Newton's, and where contacts open or close so that this does not help, Newton's
+        corrected by what the bodies did answer (Broyden 1965).
         """
         bodies, hose = self._bodies, self.hose
         forces = np.zeros((len(held), 3))
-        best = _Meeting(np.inf, forces, bodies.try_step(forces), forces, np.zeros((0, 0)))
-        give = bodies.find_compliance(is_exact=False)
+        best = _Iterate(np.inf, forces, bodies.try_step(forces), forces, np.zeros((0, 0)))
+        compliance = bodies.compute_compliance(is_exact=False)
         is_symmetric = True
-        for _ in range(MOST_SWEEPS):
-            aim = best.reached + (give @ best.forces.ravel()).reshape(-1, 3)
+        for _ in range(MOST_ITERATIONS):
+            aim = best.reached + (compliance @ best.forces.ravel()).reshape(-1, 3)
             try:
-                found = hose.coupling.try_step(held, aim, give)
+                found = hose.coupling.try_step(held, aim, compliance)
             except StepError:
                 if is_symmetric:
                     raise
-                give, is_symmetric = bodies.find_compliance(is_exact=False), True
+                compliance, is_symmetric = bodies.compute_compliance(is_exact=False), True
                 continue
-            self.sweeps += 1
+            self.coupling_iterations += 1
             moved = bodies.try_step(found)
             missed = moved - hose.coupling.compute_positions()
             gap = float(np.abs(missed).max())
             is_quick, change = gap < best.gap / _SLOW, (found - best.forces).ravel()
             if gap < best.gap:
-                best = _Meeting(gap, found, moved, aim, give)
+                best = _Iterate(gap, found, moved, aim, compliance)
             if gap < GAP:
                 return
             if is_quick:
-                give = bodies.find_compliance(is_exact=True)
+                compliance = bodies.compute_compliance(is_exact=True)
             else:
-                give = give - np.outer(missed.ravel(), change) / max(float(change @ change), 1e-300)
+                compliance = compliance - np.outer(missed.ravel(), change) / max(
+                    float(change @ change), 1e-300
+                )
             is_symmetric = False
-        hose.coupling.try_step(held, best.aim, best.give)
+        hose.coupling.try_step(held, best.aim, best.compliance)
         bodies.try_step(best.forces)
 
 
-class _Meeting(NamedTuple):
-    """How near hose and bodies have come (m), with which forces, for which answer of the bodies."""
+class _Iterate(NamedTuple):
+    """An iterate of the coupling: how near hose and bodies have come (m), with which forces (N).
+
+    `reached` is where the bodies' sites are at the end of the step (m); `aim` and `compliance`
+    are the linear answer of the bodies that the hose was solved for.
+    """
 
     gap: float
     forces: Array
     reached: Array
     aim: Array
-    give: Array
+    compliance: Array
+
+
+_QUADRATIC = int(mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC)
+_SKIPPED = int(mujoco.mjtStage.mjSTAGE_VEL)
+
+
+class Bodies:
+    """The bodies of one mjModel under MuJoCo's integrator implicitfast.
+
+    Args:
+        model, data: MuJoCo's.
+        sites: ids of the sites where forces act, (k,).
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, sites: np.ndarray) -> None:
+        self._model, self._data, self._sites = model, data, [int(site) for site in sites]
+        self._scratch = mujoco.MjData(model)
+        nv = model.nv
+        self._jacobian, self._last = np.zeros((2, 3 * len(sites), nv))
+        self._rows, self._last_rows = (
+            [matrix[3 * i : 3 * i + 3] for i in range(len(sites))]
+            for matrix in (self._jacobian, self._last)
+        )
+        self._mass, self._identity = np.zeros((nv, nv)), np.eye(nv)
+        self._user = np.zeros(nv)
+        self._kept: list[tuple[Array, Array]] = []
+        starts = np.asarray(model.D_rowadr), np.asarray(model.D_rownnz)
+        self._deriv_rows = np.repeat(np.arange(nv), starts[1])
+        places = [np.arange(a, a + n) for a, n in zip(*starts, strict=True)]
+        self._deriv_places = np.concatenate([np.zeros(0, dtype=np.int64), *places])
+        self._deriv_columns = np.asarray(model.D_colind)[self._deriv_places]
+
+    def begin(self) -> None:
+        """Begins a step from the present state, with controls and `qfrc_applied` as they are."""
+        model, data = self._model, self._data
+        mujoco.mj_step1(model, data)
+        for row, site in zip(self._rows, self._sites, strict=True):
+            mujoco.mj_jacSite(model, data, row, None, site)
+        self._user[:] = data.qfrc_applied
+        parts = (data.qpos, data.qvel, data.act, data.qacc_warmstart)
+        self._kept = [(part, part.copy()) for part in parts]
+        self._time = data.time
+
+    def try_step(self, forces: Array) -> Array:
+        """Takes the step under mean forces F (k, 3), N, of the sites on the hose.
+
+        Returns:
+            where the sites are at its end, (k, 3), m.
+        """
+        model, data = self._model, self._data
+        self.take_back()
+        data.qfrc_applied[:] = self._user - forces.ravel() @ self._jacobian
+        mujoco.mj_forwardSkip(model, data, _SKIPPED, 1)
+        mujoco.mj_implicit(model, data)
+        self._scratch.qpos[:] = data.qpos
+        self._scratch.mocap_pos[:], self._scratch.mocap_quat[:] = data.mocap_pos, data.mocap_quat
+        mujoco.mj_kinematics(model, self._scratch)
+        return np.array(self._scratch.site_xpos[self._sites])
+
+    def take_back(self) -> None:
+        """Returns to where the step began."""
+        for part, kept in self._kept:
+            part[:] = kept
+        self._data.time = self._time
+
+    def end(self) -> None:
+        """Makes the last step tried count: poses follow."""
+        self._data.qfrc_applied[:] = self._user
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+
+    def compute_compliance(self, is_exact: bool) -> Array:
+        """Returns by how much F (N) moves the sites against it in the step, (3 k, 3 k), m/N.
+
+        Contacts, limits and other constraints of the last step tried go on to act, and give way as
+        MuJoCo lets them.
+
+        Args:
+            is_exact: True for the derivative at the last step tried: forces act on the pose at the
+                beginning of the step and are seen on that at its end, so it is not symmetric where
+                bodies turn. False for the symmetric one without the turn, which every step can do.
+        """
+        model, data = self._model, self._data
+        dt = model.opt.timestep
+        mujoco.mj_fullM(model, data, self._mass)
+        damped = self._mass.copy()
+        damped[self._deriv_rows, self._deriv_columns] -= dt * data.qDeriv[self._deriv_places]
+        moved = self._jacobian.T
+        if data.nefc:
+            active = np.asarray(data.efc_state) == _QUADRATIC
+            if active.any():
+                rows = np.asarray(data.efc_J).reshape(data.nefc, -1)[active]
+                stiffness = rows.T @ (np.asarray(data.efc_D)[active, None] * rows)
+                gone = np.linalg.solve(self._mass + stiffness, moved)
+                moved = moved - stiffness @ gone
+        answer = np.linalg.solve(damped, moved)
+        if not is_exact:
+            answer = self._jacobian @ answer
+            return np.asarray(dt * dt * 0.5 * (answer + answer.T))
+        mujoco.mj_comPos(model, self._scratch)
+        for row, site in zip(self._last_rows, self._sites, strict=True):
+            mujoco.mj_jacSite(model, self._scratch, row, None, site)
+        return np.asarray(dt * dt * self._last @ answer)

@@ -29,7 +29,7 @@ def count_control_points(n_robots: int) -> int:
     return 3 + max(13, 5 * n_robots)
 
 
-def relax_hose(
+def relax_initial_shape(
     spec: HoseSpec,
     places: Array,
     arc_lengths: Array,
@@ -61,26 +61,26 @@ def relax_hose(
         obstacles=obstacles,
         scheme="backward-euler",
     )
-    hose.reset(_draw(hose, places[::-1], arc_lengths[::-1]))
+    hose.reset(_draw_guess(hose, places[::-1], arc_lengths[::-1]))
     for s, place in zip(arc_lengths, places, strict=True):
         hose.attach(float(s), place)
     hose.step(round(_DURATION / _STEP))
     return hose
 
 
-def lay_hose(
+def make_initial_shape(
     spec: HoseSpec,
     places: Array,
     arc_lengths: Array,
     obstacles: Sequence[Obstacle],
     gravity: Array,
 ) -> Array:
-    """Returns points of `relax_hose` spread evenly from arc length 0 to L, (257, 3), m."""
-    hose = relax_hose(spec, places, arc_lengths, obstacles, gravity)
+    """Returns points of `relax_initial_shape` spread evenly from arc length 0 to L, (257, 3), m."""
+    hose = relax_initial_shape(spec, places, arc_lengths, obstacles, gravity)
     return hose.position(np.linspace(0.0, spec.length, N_POINTS))
 
 
-def _draw(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
+def _draw_guess(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
     """The first shape, from the source to the tip; a free end goes straight on. (257, 3), m."""
     even = np.linspace(0.0, hose.spec.length, N_POINTS)
     points = np.zeros((N_POINTS, 3))
@@ -112,19 +112,19 @@ def _draw(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
 
 
 def _judge(hose: GedsHose, arc_lengths: Array, points: Array, earlier: Array) -> float:
-    """How little points (k, 3), m, suit as the next part of a hose after points before (j, 3).
+    """Rates how little points (k, 3), m, suit as the next part of a hose after others (j, 3).
 
     What it would stand in counts, then whether it would cross itself.
     """
     radius = hose.spec.outer_radius
-    cost = 1e3 * (0.99 * radius - _find_clearance(hose, arc_lengths, points)) / radius
+    cost = 1e3 * (0.99 * radius - _compute_clearance(hose, arc_lengths, points)) / radius
     apart = np.linalg.norm(points[None, _NEAR:] - earlier[:-_NEAR, None], axis=2)
     if apart.min(initial=np.inf) < 2.0 * radius:
         cost += 10.0
     return cost
 
 
-def _find_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:
+def _compute_clearance(hose: GedsHose, arc_lengths: Array, points: Array) -> float:
     """Least distance of points (k, 3) of the hose from obstacles, nearly a radius at most (m)."""
     distances = hose.contacts.measure_obstacles(points)
     for row, obstacle in zip(distances, hose.contacts.obstacles, strict=True):

@@ -7,6 +7,7 @@ between them and all contacts in one step.
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -23,11 +24,20 @@ from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
-from hose_mj.world.chain_fit import fit_curve
-from hose_mj.world.hose_contact import HoseContact, open_scene
-from hose_mj.world.initial_shape import lay_hose
-from hose_mj.world.mujoco_scene import PREFIX, Numerics, join_hose
+from hose_mj.world.initial_shape import make_initial_shape
+from hose_mj.world.mujoco_scene import (
+    PREFIX,
+    HoseContact,
+    Numerics,
+    join_hose,
+    open_scene,
+)
 from hose_mj.world.world import World
+
+_ROUNDS = 50
+"""Newton steps of `fit_chain` at most; a chain that can reach takes a few."""
+_TOLERANCE = 1e-13
+"""Error of a fitted chain over its length: rounding."""
 
 
 class MujocoWorld(World):
@@ -37,7 +47,7 @@ class MujocoWorld(World):
     replaced; the rest of it is as the scene says. Site-to-site `connect` constraints tie the hose
     to the robots and the source. It touches the geoms that a geom of contype and conaffinity 1
     would touch, with the scene's friction for the hose; not itself, and not the geoms of a robot
-    within three of its radii of arc from its attachment (hose_contact.py).
+    within three of its radii of arc from its attachment (mujoco_scene.py).
 
     Args:
         scene: checked.
@@ -74,12 +84,12 @@ class MujocoWorld(World):
         self._tensions = np.zeros(0)
         self._start_bodies()
         places = self.site_positions()
-        curve = lay_hose(
+        curve = make_initial_shape(
             scene.spec, places, self.arc_lengths, obstacles, np.array(self.model.opt.gravity)
         )
         self._start = fit_curve(curve, nodes, self.arc_lengths, places)
         self.reset()
-        met = self.position(self.arc_lengths) - self.site_positions()
+        met = self.hose_position(self.arc_lengths) - self.site_positions()
         self.start_gap = float(np.linalg.norm(met, axis=1).max())
 
     # -- what each kind of hose says for itself ----------------------------------------------------
@@ -100,12 +110,12 @@ class MujocoWorld(World):
         """Sets what can be set in a compiled model only."""
 
     @abstractmethod
-    def _lay(self, nodes: Array) -> None:
+    def _set_nodes(self, nodes: Array) -> None:
         """Writes the qpos of the hose with its nodes at (K + 1, 3), m."""
 
     @abstractmethod
     def _read_motion(self) -> Motion:
-        """How the hose lies and moves now."""
+        """Reads how the hose lies and moves now."""
 
     @abstractmethod
     def _read_tensions(self) -> Array:
@@ -136,7 +146,7 @@ class MujocoWorld(World):
     def reset(self) -> None:
         """See `World.reset`; forces and tensions are those of the first instant."""
         self._start_bodies()
-        self._lay(self._start)
+        self._set_nodes(self._start)
         self.data.qvel[self._joints] = 0.0
         with mute_warnings():
             mujoco.mj_forward(self.model, self.data)
@@ -149,12 +159,12 @@ class MujocoWorld(World):
         for _ in range(n_steps):
             self._advance()
 
-    def position(self, arc_length: ArrayLike) -> Array:
-        """See `World.position`; straight between the nodes."""
+    def hose_position(self, arc_length: ArrayLike) -> Array:
+        """See `World.hose_position`; straight between the nodes."""
         return self._move().position(self._check(arc_length))
 
-    def velocity(self, arc_length: ArrayLike) -> Array:
-        """See `World.velocity`."""
+    def hose_velocity(self, arc_length: ArrayLike) -> Array:
+        """See `World.hose_velocity`."""
         return self._move().velocity(self._check(arc_length))
 
     def tension(self, arc_length: ArrayLike) -> Array:
@@ -225,3 +235,76 @@ class MujocoWorld(World):
         """Forces of the ties on the hose in MuJoCo's last step (N + 1, 3), N."""
         force = self.data.efc_force
         return np.stack([force[find_rows(self.data, k)] for k in self._holds])
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A point of a chain that is to be at a target.
+
+    Attributes:
+        piece: number of the straight piece.
+        part: fraction of the piece that lies before the point.
+        target: (3,), m.
+    """
+
+    piece: int
+    part: float
+    target: Array
+
+
+def fit_curve(curve: Array, nodes: Array, arc_lengths: Array, places: Array) -> Array:
+    """Returns a chain along a curve.
+
+    Args:
+        curve: points even in arc length from 0 to L (n, 3), m.
+        nodes: arc lengths of the chain's nodes, rising from 0 to L, (K + 1,), m.
+        arc_lengths: of what holds it (k,), m.
+        places: where that is (k, 3), m.
+
+    Returns:
+        nodes (K + 1, 3), m, near the curve; see `fit_chain`.
+    """
+    even, lengths = np.linspace(0.0, nodes[-1], len(curve)), np.diff(nodes)
+    points = np.stack([np.interp(nodes, even, curve[:, c]) for c in range(3)], axis=1)
+    piece = np.clip(np.searchsorted(nodes, arc_lengths, "right") - 1, 0, len(lengths) - 1)
+    parts = (arc_lengths - nodes[piece]) / lengths[piece]
+    pins = [Pin(int(k), float(part), p) for k, part, p in zip(piece, parts, places, strict=True)]
+    return fit_chain(points, lengths, pins)
+
+
+def fit_chain(points: Array, lengths: Array, pins: list[Pin]) -> Array:
+    """Returns nodes near `points` whose distances are `lengths` and that meet the pins.
+
+    Newton's method on these equations, each step the smallest that solves their linear form. What
+    cannot be met (pins further apart than the chain is long) is left as it is after so many rounds.
+
+    Args:
+        points: (N + 1, 3), m.
+        lengths: (N,), m.
+        pins: what holds the chain.
+
+    Returns:
+        nodes (N + 1, 3), m.
+    """
+    nodes = points.copy()
+    count = len(lengths)
+    rows = np.zeros((count + 3 * len(pins), count + 1, 3))
+    for k, pin in enumerate(pins):
+        block = rows[count + 3 * k : count + 3 * k + 3]
+        block[:, pin.piece] = (1.0 - pin.part) * np.eye(3)
+        block[:, pin.piece + 1] = pin.part * np.eye(3)
+    piece = np.arange(count)
+    for _ in range(_ROUNDS):
+        chords = np.diff(nodes, axis=0)
+        found = np.linalg.norm(chords, axis=1)
+        errors = [found - lengths]
+        for pin in pins:
+            errors.append(nodes[pin.piece] + pin.part * chords[pin.piece] - pin.target)
+        error = np.concatenate(errors)
+        if np.abs(error).max() < _TOLERANCE * lengths.sum():
+            break
+        tangents = chords / found[:, None]
+        rows[piece, piece], rows[piece, piece + 1] = -tangents, tangents
+        change = np.linalg.lstsq(rows.reshape(len(rows), -1), error, rcond=1e-10)[0]
+        nodes -= change.reshape(-1, 3)
+    return nodes

@@ -1,4 +1,4 @@
-"""`Pucks`: robots that are masses on slides, stepped with their hose in compiled code.
+"""`PlanarPointRobots`: masses on slides, stepped with their hose in compiled code.
 
 Their motion is what MuJoCo makes of them as long as they touch nothing; where one may, the step is
 MuJoCo's (tests/world/test_planar_point_robots.py).
@@ -7,36 +7,37 @@ MuJoCo's (tests/world/test_planar_point_robots.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
+from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.point_masses import PointMasses
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array, Hold
-from hose_mj.world.hose_touch import HoseTouch
-from hose_mj.world.scene_geoms import KIND_NAMES, find_radius
-
-if TYPE_CHECKING:
-    from hose_mj.world.geds_world import GedsWorld
+from hose_mj.world.geds_contact import GedsContact
+from hose_mj.world.scene_geoms import KIND_NAMES, compute_radius
+from hose_mj.world.world import World
 
 _ALIGNED = 1.0 - 1e-12
 
 
-class Pucks:
+class PlanarPointRobots:
     """The robots of a world in which nothing else moves, each a body on slides along world axes.
 
     Args:
         world: as it starts.
-        touch: contact of its hose.
+        hose: of the world.
+        contact: of the hose with the scene.
         axes: axis of the world that each degree of freedom goes along, (nv,).
         signs: +1 or -1, whether it goes up or down that axis, (nv,).
     """
 
-    def __init__(self, world: GedsWorld, touch: HoseTouch, axes: np.ndarray, signs: Array) -> None:
+    def __init__(
+        self, world: World, hose: GedsHose, contact: GedsContact, axes: np.ndarray, signs: Array
+    ) -> None:
         model, data = world.model, world.data
-        self._world, self._touch = world, touch
+        self._world, self._hose, self._contact = world, hose, contact
         k, roots = world.n_robots, model.body_rootid
         self._sites = world.sites[:-1]
         root_of = {int(roots[model.site_bodyid[site]]): i for i, site in enumerate(self._sites)}
@@ -54,8 +55,8 @@ class Pucks:
             away = np.linalg.norm(data.geom_xpos[own] - data.site_xpos[site], axis=1)
             room = away + model.geom_rbound[own] + model.geom_margin[own]
             reach[i] = room.max(initial=0.0)
-            radius[i] = find_radius(model, data, site, own) if flat else reach[i]
-        geoms = touch.geoms
+            radius[i] = compute_radius(model, data, site, own) if flat else reach[i]
+        geoms = contact.geoms
         owner = np.full(len(geoms.ids), -1, dtype=np.int64)
         arm = np.zeros((len(geoms.ids), 3))
         for place in geoms.moving:
@@ -73,15 +74,15 @@ class Pucks:
             radius=radius,
             across=2 if flat else 3,
             reach=reach,
-            walls=world.hose.contacts.make_shapes(_find_walls(model, data, flat)),
+            walls=hose.contacts.make_shapes(_find_walls(model, data, flat)),
             owner=owner,
             arm=arm,
             push=np.zeros((k, 3)),
         )
 
     @classmethod
-    def find(cls, world: GedsWorld, touch: HoseTouch) -> Pucks | None:
-        """Returns the pucks of a world, None where a robot is something else."""
+    def find(cls, world: World, hose: GedsHose, contact: GedsContact) -> PlanarPointRobots | None:
+        """Returns the robots of a world, None where one of them is something else."""
         model, data = world.model, world.data
         mujoco.mj_forward(model, data)
         slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
@@ -94,7 +95,7 @@ class Pucks:
             and not (model.jnt_stiffness.any() or model.dof_frictionloss.any())
             and not (model.jnt_limited.any() or model.neq or model.ntendon or model.nplugin)
             and not (model.opt.density or model.opt.viscosity or data.nefc)
-            and not len(touch.geoms.measured)
+            and not len(contact.geoms.measured)
             and _has_motors(model)
         )
         if not plain:
@@ -104,19 +105,12 @@ class Pucks:
         signs = directions[np.arange(model.nv), axes]
         full = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
-        own_axis = (
-            len(
-                {
-                    (int(b), int(a))
-                    for b, a in zip(model.body_rootid[model.dof_bodyid], axes, strict=True)
-                }
-            )
-            == model.nv
-        )
+        owners = model.body_rootid[model.dof_bodyid].tolist()
+        own_axis = len(set(zip(owners, axes.tolist(), strict=True))) == model.nv
         diagonal = not np.any(full - np.diag(np.diag(full)))
         if not (own_axis and diagonal and np.all(np.abs(signs) > _ALIGNED)):
             return None
-        return cls(world, touch, axes, np.sign(signs))
+        return cls(world, hose, contact, axes, np.sign(signs))
 
     def step(self, holds: Sequence[Hold], n_steps: int) -> int:
         """Advances hose and robots by up to n_steps steps; returns how many it was.
@@ -124,7 +118,7 @@ class Pucks:
         Raises:
             StepError: a step that the hose cannot finish; the steps before count.
         """
-        world, masses, touch = self._world, self._masses, self._touch
+        world, masses, contact = self._world, self._masses, self._contact
         data = world.data
         world.check_control()
         masses.position[:] = data.site_xpos[self._sites]
@@ -132,19 +126,19 @@ class Pucks:
         masses.force[self._at] = self._signs * (self._constant + self._find_motor_forces())
         masses.force[:] += world.robot_forces
         masses.push[:] = 0.0
-        moving, owner = touch.geoms.moving, masses.owner
+        moving, owner = contact.geoms.moving, masses.owner
         if len(moving):
-            np.add.at(masses.push, owner[moving], touch.pushes[:, :3])
+            np.add.at(masses.push, owner[moving], contact.pushes[:, :3])
         start = masses.position.copy()
         try:
-            return self._finish(world.hose.coupling.step_with_masses(holds, masses, n_steps), start)
+            return self._finish(self._hose.coupling.step_with_masses(holds, masses, n_steps), start)
         except BaseException:
             self._finish(0, start)
             raise
 
     def _finish(self, done: int, start: Array) -> int:
         """Hands the masses back to MuJoCo."""
-        world, masses, touch = self._world, self._masses, self._touch
+        world, masses, contact = self._world, self._masses, self._contact
         data = world.data
         moved = (masses.position - start)[self._at]
         data.qpos[:] += self._signs * moved
@@ -152,12 +146,12 @@ class Pucks:
         data.time += done * world.timestep
         mujoco.mj_kinematics(world.model, data)
         mujoco.mj_comPos(world.model, data)
-        moving = touch.geoms.moving
+        moving = contact.geoms.moving
         if len(moving):
-            touch.pushes[:] = 0.0
+            contact.pushes[:] = 0.0
             owner = masses.owner[moving]
             first = np.unique(owner, return_index=True)
-            touch.pushes[first[1], :3] = masses.push[first[0]]
+            contact.pushes[first[1], :3] = masses.push[first[0]]
         return done
 
     def _find_constant_force(self) -> Array:
@@ -187,7 +181,7 @@ class Pucks:
 
 
 def _has_motors(model: mujoco.MjModel) -> bool:
-    """Whether all actuators are plain motors on joints."""
+    """Says whether all actuators are plain motors on joints."""
     return bool(
         np.all(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT)
         and np.all(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE)
@@ -197,7 +191,7 @@ def _has_motors(model: mujoco.MjModel) -> bool:
 
 
 def _find_walls(model: mujoco.MjModel, data: mujoco.MjData, flat: bool) -> list[Obstacle]:
-    """What stands still and may stop a robot; what MuJoCo alone can measure as a sphere about it.
+    """Lists what stands still and may stop a robot; a sphere about what MuJoCo alone can measure.
 
     Robots that move horizontally keep their height over horizontal planes.
     """

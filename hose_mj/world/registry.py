@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.registry import check_model
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
-from hose_mj.world.cable_world import CableWorld
-from hose_mj.world.flex_world import FlexWorld
-from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.world import World
 
-WORLDS: dict[str, type[World]] = {"geds": GedsWorld, "cable": CableWorld, "flex": FlexWorld}
+WORLDS = {
+    "geds": "hose_mj.world.geds_world:GedsWorld",
+    "cable": "hose_mj.world.cable_world:CableWorld",
+    "flex": "hose_mj.world.flex_world:FlexWorld",
+}
+"""Worlds' classes by the hose's model, loaded when one is asked for."""
 
 
 def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -> World:
     """Makes a world, at the start of its scene.
 
     Args:
-        scene: checked, or the name of a shipped one, or an MJCF file.
+        scene: checked, or a name of `list_scenes`, or an MJCF file.
         model: of the hose, one of `WORLDS`.
         **options: those of the world's class, such as `timestep`.
 
@@ -30,6 +33,8 @@ def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -
     if model not in WORLDS:
         raise InputError("model", model, "one of " + ", ".join(WORLDS))
     check_model(model)
+    module, _, name = WORLDS[model].partition(":")
+    world_class: type[World] = getattr(import_module(module), name)
     if not isinstance(scene, Scene):
         scene = read_scene(find_scene(scene))
-    return WORLDS[model](scene, **options)
+    return world_class(scene, **options)

@@ -2,7 +2,7 @@
 
 MuJoCo's rule decides which geoms collide, with contype = conaffinity = 1 for the hose. Planes,
 spheres, capsules, cylinders and boxes become `Obstacle`s. Meshes, ellipsoids and what else MuJoCo
-can measure the distance of go through `mj_geomDistance` (measured_geoms.py).
+can measure the distance of go through `mj_geomDistance` (geds_contact.py).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class SceneGeoms:
         for site, s in zip(sites[:-1], arc_lengths[:-1], strict=True):
             root = model.body_rootid[model.site_bodyid[site]]
             own = np.flatnonzero(model.body_rootid[model.geom_bodyid] == root)
-            arc = OWN_ARC * find_radius(model, data, site, own)
+            arc = OWN_ARC * compute_radius(model, data, site, own)
             skips[own] = [s - arc, s + arc]
         ids = touched[simple]
         bodies = model.geom_bodyid[ids]
@@ -101,7 +101,9 @@ def find_colliding(model: mujoco.MjModel) -> np.ndarray:
     return np.flatnonzero((model.geom_contype & 1) | (model.geom_conaffinity & 1))
 
 
-def find_radius(model: mujoco.MjModel, data: mujoco.MjData, site: int, geoms: np.ndarray) -> float:
+def compute_radius(
+    model: mujoco.MjModel, data: mujoco.MjData, site: int, geoms: np.ndarray
+) -> float:
     """Largest horizontal distance of colliding geoms of a robot from its site (m).
 
     Exact for upright cylinders and for spheres, by bounding boxes for others; all of its geoms

@@ -2,14 +2,15 @@
 
 Robots, walls and obstacles are bodies of one mjModel. `geds` hoses are coupled to it
 (geds_world.py); `cable` and `flex` hoses are part of it (mujoco_world.py). All of them start from
-the same shape (laying.py) and answer the same questions. Frame: the world's; SI units. Arc length 0
-is at the source, L at the tip.
+the same shape (initial_shape.py) and answer the same questions. Frame: the world's; SI units. Arc
+length 0 is at the source, L at the tip.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import Any
+from warnings import warn
 
 import mujoco
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.protocol import Array
-from hose_mj.scenes.mjcf.model import START
+from hose_mj.scenes.mjcf.model import reset_to_start
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
 
@@ -82,12 +83,12 @@ class World(ABC):
         """
 
     @abstractmethod
-    def position(self, arc_length: ArrayLike) -> Array:
-        """Centre line of the hose, shape (k, 3), m."""
+    def hose_position(self, arc_length: ArrayLike) -> Array:
+        """Points of the hose's centre line at arc lengths (k,), m: (k, 3), m."""
 
     @abstractmethod
-    def velocity(self, arc_length: ArrayLike) -> Array:
-        """Velocity of the centre line, shape (k, 3), m/s."""
+    def hose_velocity(self, arc_length: ArrayLike) -> Array:
+        """Velocities of these points, (k, 3), m/s."""
 
     @abstractmethod
     def tension(self, arc_length: ArrayLike) -> Array:
@@ -106,11 +107,23 @@ class World(ABC):
 
     @abstractmethod
     def hose_snapshot(self) -> dict[str, Any]:
-        """What the hose remembers beyond MuJoCo's own state; arrays and plain numbers only."""
+        """Returns what the hose remembers beyond MuJoCo's state; arrays and plain numbers only."""
 
     @abstractmethod
     def restore_hose(self, state: dict[str, Any]) -> None:
         """The inverse of `hose_snapshot`."""
+
+    # -- names of the release before ---------------------------------------------------------------
+
+    def position(self, arc_length: ArrayLike) -> Array:
+        """The name of `hose_position` before; gone with the next release."""
+        warn("World.position is now World.hose_position", DeprecationWarning, stacklevel=2)
+        return self.hose_position(arc_length)
+
+    def velocity(self, arc_length: ArrayLike) -> Array:
+        """The name of `hose_velocity` before; gone with the next release."""
+        warn("World.velocity is now World.hose_velocity", DeprecationWarning, stacklevel=2)
+        return self.hose_velocity(arc_length)
 
     # -- robots ------------------------------------------------------------------------------------
 
@@ -120,11 +133,11 @@ class World(ABC):
         return len(self.scene.robots)
 
     def site_positions(self) -> Array:
-        """Where robots and source hold the hose, in the order of `sites`, (N + 1, 3), m."""
+        """Returns where robots and source hold the hose, in the order of `sites`, (N + 1, 3), m."""
         return np.array(self.data.site_xpos[self.sites])
 
     def site_velocities(self) -> Array:
-        """How fast these move, (N + 1, 3), m/s."""
+        """Returns how fast these move, (N + 1, 3), m/s."""
         rows = np.zeros((3, self.model.nv))
         found = np.zeros((len(self.sites), 3))
         for k, site in enumerate(self.sites):
@@ -133,7 +146,7 @@ class World(ABC):
         return found
 
     def goal_position(self) -> Array:
-        """Where the tip is to go, (3,), m."""
+        """Returns where the tip is to go, (3,), m."""
         return np.array(self.data.site(self.scene.goal.site).xpos)
 
     def apply_force(self, robot: int, force: ArrayLike) -> None:
@@ -182,11 +195,7 @@ class World(ABC):
 
     def _start_bodies(self) -> None:
         """Puts the scene's bodies where it starts."""
-        key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, START)
-        if key >= 0:
-            mujoco.mj_resetDataKeyframe(self.model, self.data, key)
-        else:
-            mujoco.mj_resetData(self.model, self.data)
+        reset_to_start(self.model, self.data)
         self.control[:], self.robot_forces[:] = 0.0, 0.0
         self._update_poses()
 

@@ -60,10 +60,10 @@ class FakeWorld(World):
     def step(self, n_steps=1):
         self.clock += n_steps * self.timestep
 
-    def position(self, arc_length):
+    def hose_position(self, arc_length):
         return self.line.position(np.atleast_1d(arc_length))
 
-    def velocity(self, arc_length):
+    def hose_velocity(self, arc_length):
         return np.zeros((len(np.atleast_1d(arc_length)), 3))
 
     def tension(self, arc_length):

@@ -6,7 +6,7 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from hose_mj.constraints.breaks import KINDS
+from hose_mj.constraints.kinds import KINDS
 from hose_mj.constraints.limits import Limits
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "constraints.md"
@@ -28,6 +28,6 @@ def test_links_lead_to_files():
 def test_every_kind_and_every_limit_is_explained():
     text = PAGE.read_text(encoding="utf-8")
     for kind in KINDS:
-        assert f"| `{kind} i" in text
+        assert f"| `{kind.name} i" in text
     for field in fields(Limits):
         assert f"`{field.name}`" in text

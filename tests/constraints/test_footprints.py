@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hose_mj.constraints.footprints import find_footprint, find_hose_bodies, find_obstacles
+from hose_mj.constraints.footprints import find_hose_bodies, find_obstacles, make_footprint
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
@@ -15,14 +15,14 @@ BALL = '<geom type="sphere" size=".1"/>'
 
 
 def name_obstacles(world, ground=()):
-    footprints = [find_footprint(world, i) for i in range(world.n_robots)]
+    footprints = [make_footprint(world, i) for i in range(world.n_robots)]
     geoms, may_hit = find_obstacles(world, footprints, ground)
     assert may_hit.shape == (sum(len(f.geoms) for f in footprints), len(geoms))
     return [world.model.geom(g).name for g in geoms]
 
 
 def test_a_puck_is_one_upright_disc(floor):
-    footprint = find_footprint(floor, 0)
+    footprint = make_footprint(floor, 0)
     assert [floor.model.geom(g).name for g in footprint.geoms] == ["robot0/disc"]
     assert footprint.radius == pytest.approx(0.02)
     assert footprint.upright
@@ -44,19 +44,19 @@ def test_a_puck_is_one_upright_disc(floor):
     ],
 )
 def test_radius_about_the_middle_of_what_collides(make_world, geoms, radius):
-    assert find_footprint(make_world(geoms, BALL), 0).radius == pytest.approx(radius)
+    assert make_footprint(make_world(geoms, BALL), 0).radius == pytest.approx(radius)
 
 
 def test_a_cylinder_that_can_tip_is_no_disc(make_world):
     tower = '<geom type="cylinder" size=".1 .2"/>'
-    assert find_footprint(make_world(tower, BALL), 0).upright
+    assert make_footprint(make_world(tower, BALL), 0).upright
     lying = '<geom type="cylinder" size=".1 .2" euler="90 0 0"/>'
-    assert not find_footprint(make_world(lying, BALL), 0).upright
+    assert not make_footprint(make_world(lying, BALL), 0).upright
     joint = '<joint name="robot{{i}}/turn" type="hinge" axis="{}"/>'
-    assert find_footprint(make_world(tower, BALL, turn=joint.format("0 0 1")), 0).upright
-    assert not find_footprint(make_world(tower, BALL, turn=joint.format("1 0 0")), 0).upright
+    assert make_footprint(make_world(tower, BALL, turn=joint.format("0 0 1")), 0).upright
+    assert not make_footprint(make_world(tower, BALL, turn=joint.format("1 0 0")), 0).upright
     two = tower + '<geom type="cylinder" size=".05 .2"/>'
-    assert not find_footprint(make_world(two, BALL), 0).upright
+    assert not make_footprint(make_world(two, BALL), 0).upright
 
 
 def test_a_robot_without_geoms_is_refused(make_world):
@@ -71,7 +71,7 @@ def test_what_robots_stand_on_is_no_obstacle(make_world):
     wall = '<geom name="wall" type="box" size=".01 1 1" pos="2.112 0 1"/>'
     world = make_world(BALL, BALL, others=block + wall)
     assert name_obstacles(world) == ["floor", "block", "wall"]  # robot 1 may hit the block
-    footprint = find_footprint(world, 0)
+    footprint = make_footprint(world, 0)
     geoms, may_hit = find_obstacles(world, [footprint], ())
     assert [world.model.geom(g).name for g in geoms] == ["floor", "wall"]
     assert may_hit.all()

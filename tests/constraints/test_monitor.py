@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from hose_mj.constraints.breaks import KINDS
+from hose_mj.constraints.kinds import KIND_OF
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.monitor import Monitor
 
@@ -36,7 +36,7 @@ def test_names_say_what_is_measured(floor):
     assert monitor.units == ("N", "N", "m", "m", "m", "m", "m")
     assert monitor.limit_texts[0] == "tension at most 10 N"
     assert len(monitor.limit_texts) == len(monitor.names) == len(monitor.measure())
-    assert set(monitor.kinds) <= set(KINDS)
+    assert set(monitor.kinds) <= set(KIND_OF)
 
 
 def test_a_tension_that_rises_evenly_breaks_at_its_time_and_place(floor):

@@ -61,12 +61,12 @@ def test_a_robot_that_pulls_away_stretches_its_segment(world, monitor):
 
 
 def test_a_robot_that_goes_for_the_hose_runs_over_it(world, monitor):
-    found = steer(world, monitor, 1, lambda: world.position(0.65)[0])
+    found = steer(world, monitor, 1, lambda: world.hose_position(0.65)[0])
     assert (found.kind, found.robot, found.other) == ("run-over", 1, 0)
     place = world.site_positions()[1]
     assert np.linalg.norm((found.place - place)[:2]) == pytest.approx(0.0288, abs=1e-3)
     s = np.linspace(0.0, 0.8, 2001)
-    apart = np.linalg.norm((world.position(s) - place)[:, :2], axis=1)
+    apart = np.linalg.norm((world.hose_position(s) - place)[:, :2], axis=1)
     foreign = np.abs(s - 0.4) > 0.06
     assert apart[foreign].min() - 0.0288 == pytest.approx(found.margin, abs=2e-5)
 

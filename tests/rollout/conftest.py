@@ -40,7 +40,7 @@ class RailWorld(World):
     def shift(self, robot):
         return -0.1 * (robot + 1) * self.time
 
-    def position(self, arc_length):
+    def hose_position(self, arc_length):
         s = np.asarray(arc_length)[:, None] / self.scene.spec.length
         places = self.site_positions()[::-1]
         k = np.minimum((s[:, 0] * self.n_robots).astype(int), self.n_robots - 1)
@@ -48,7 +48,7 @@ class RailWorld(World):
         bow = 0.1 * np.sin(np.pi * u) * [np.cos(3 * self.time), 0, 0]
         return (1 - u) * places[k] + u * places[k + 1] + bow
 
-    def velocity(self, arc_length):
+    def hose_velocity(self, arc_length):
         return np.zeros((len(arc_length), 3))
 
     def tension(self, arc_length):
@@ -56,7 +56,7 @@ class RailWorld(World):
 
     def centre_line(self):
         s = np.linspace(0.0, self.scene.spec.length, 9)
-        return CentreLine.of_chain(s, self.position(s))
+        return CentreLine.of_chain(s, self.hose_position(s))
 
     def attachment_forces(self):
         forces = np.zeros((self.n_robots + 1, 3))
@@ -77,7 +77,7 @@ class RailMonitor:
     kinds = ("stretch", "obstacle")
     units = ("N", "m")
     limit_texts = ("at most 10 N", "more than 0 m")
-    limits = SimpleNamespace(find_tension=lambda spec, gravity: 10.0)
+    limits = SimpleNamespace(compute_tension_limit=lambda spec, gravity: 10.0)
 
     def __init__(self, world):
         self.world = world

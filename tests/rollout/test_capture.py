@@ -18,8 +18,7 @@ from hose_mj.recording.rerun import (
 from hose_mj.recording.rerun.episodes import check_url
 from hose_mj.recording.rerun.world_scene import rotate
 from hose_mj.recording.world_table import write_csv
-from hose_mj.rollout.capture import Capture
-from hose_mj.rollout.staging import Cast, HoseReader, make_stage
+from hose_mj.rollout.capture import Capture, HoseReader, SceneBodies, describe_scene
 from hose_mj.world.registry import make_world
 
 N_SAMPLES = 30
@@ -33,7 +32,7 @@ def recording(episode, tmp_path):
 
 
 def test_the_stage_shows_every_visible_geom_where_it_is(world, monitor):
-    stage, cast = make_stage(world, monitor, {})
+    stage, cast = describe_scene(world, monitor, {})
     assert stage.bodies == ("robot0/puck", "robot1/puck")
     assert len(stage.geoms) == world.model.ngeom  # all of the floor's are in groups 0 and 1
     for i, geom in enumerate(stage.geoms):
@@ -59,7 +58,7 @@ def test_bodies_of_a_hose_are_not_on_stage(world, floor):
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     data.xpos[:, 2] += 0.5
-    cast = Cast(SimpleNamespace(scene=floor, model=model, data=data))
+    cast = SceneBodies(SimpleNamespace(scene=floor, model=model, data=data))
     assert cast.names == ("robot0/puck", "robot1/puck")
     assert [model.body(i).name for i in cast.bodies] == list(cast.names)
 
@@ -213,9 +212,9 @@ def test_a_spline_hose_is_read_as_the_world_says(floor):
     world.step(50)
     arc_lengths = np.linspace(0.0, floor.spec.length, 33)
     control_points, hose = HoseReader(world, arc_lengths).read(world)
-    np.testing.assert_allclose(hose, world.position(arc_lengths), atol=1e-12)
+    np.testing.assert_allclose(hose, world.hose_position(arc_lengths), atol=1e-12)
     np.testing.assert_allclose(control_points[[0, -1]], hose[[0, -1]], atol=1e-12)  # open knots
-    assert not np.allclose(hose, make_world(floor).position(arc_lengths))
+    assert not np.allclose(hose, make_world(floor).hose_position(arc_lengths))
 
 
 def test_margins_that_are_known_are_not_measured_again(world, monitor):

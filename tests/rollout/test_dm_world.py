@@ -88,7 +88,7 @@ def test_what_is_seen_follows_the_world(env):
     assert np.array_equal(physics.data.site_xpos[world.sites], world.site_positions())
     pieces = [physics.named.data.xpos[f"{HOSE}{k}"] for k in range(N_PIECES)]
     arcs = np.linspace(0.0, world.scene.spec.length, N_PIECES + 1)
-    points = world.position(arcs)
+    points = world.hose_position(arcs)
     assert np.array(pieces) == pytest.approx(0.5 * (points[1:] + points[:-1]))
     # Nothing that a viewer writes reaches the world.
     before = world.snapshot()

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hose_mj.rollout.drawing import draw_hose
+from hose_mj.rollout.video import draw_hose
 from hose_mj.world.registry import make_world
 
 
@@ -20,7 +20,7 @@ def test_capsules_follow_the_hose(world):
     scn.ngeom = 3  # what is there stays
     assert draw_hose(scn, world, 10.0, n_pieces=40) == 40
     assert scn.ngeom == 43
-    points = world.position(np.linspace(0.0, world.scene.spec.length, 41))
+    points = world.hose_position(np.linspace(0.0, world.scene.spec.length, 41))
     for geom, start, end in zip(scn.geoms[3:43], points[:-1], points[1:], strict=True):
         assert geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE
         assert geom.pos == pytest.approx(0.5 * (start + end), abs=1e-6)

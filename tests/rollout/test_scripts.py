@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hose_mj.rollout.planning import Cells, Plan
+from hose_mj.rollout.planning import FreeCells, GoalPlan
 from hose_mj.rollout.scripts import Player, Script, move, relax
-from hose_mj.world.actions import find_centres
+from hose_mj.world.actions import compute_centres
 from hose_mj.world.driving import Driver
 from hose_mj.world.registry import make_world
 
@@ -67,7 +67,7 @@ def deck():
 
 
 def test_the_way_on_the_deck_is_free_and_shortest(deck):
-    cells = Cells(deck, deck.world.site_positions()[0], hose=False)
+    cells = FreeCells(deck, deck.world.site_positions()[0], hose=False)
     goal = cells.find_goal()
     path = cells.find_path(goal)
     assert path[-1] == goal
@@ -100,14 +100,14 @@ def find_shortest(cells, start, goal):
 
 
 def test_crates_other_robots_and_the_edge_are_not_free(deck):
-    cells = Cells(deck, deck.world.site_positions()[0], hose=False)
+    cells = FreeCells(deck, deck.world.site_positions()[0], hose=False)
     world = deck.world
     size = world.scene.cell_size
 
     def is_free_at(place):
         source = world.site_positions()[-1]
         cell = np.round((np.array([*place, source[2]]) - source) / size).astype(int)
-        assert np.linalg.norm((find_centres(world, cell) - [*place, 0])[:2]) < size
+        assert np.linalg.norm((compute_centres(world, cell) - [*place, 0])[:2]) < size
         return cells.is_free((int(cell[0]), int(cell[1]), 0))
 
     assert is_free_at((0.9, -2.2))
@@ -119,7 +119,7 @@ def test_a_plan_keeps_segments_slack_and_ends_at_the_goal(deck):
     world = deck.world
     spans = -np.diff(world.arc_lengths)
     for slack in (0.85, 0.95):
-        script = Plan(0, False, 1.0, slack).make_script(deck)
+        script = GoalPlan(0, False, 1.0, slack).make_script(deck)
         source = world.site_positions()[-1]
         for formation in script.formations:
             apart = np.linalg.norm(np.diff(np.vstack([formation, source]), axis=0), axis=1)
@@ -129,6 +129,6 @@ def test_a_plan_keeps_segments_slack_and_ends_at_the_goal(deck):
 
 def test_robots_that_fly_rise_first():
     driver = Driver(make_world("lift"))
-    script = Plan(3, True, 1.0, 0.95).make_script(driver)
+    script = GoalPlan(3, True, 1.0, 0.95).make_script(driver)
     risen = script.formations[0] - driver.world.site_positions()[:-1]
     assert risen == pytest.approx(np.tile([0.0, 0.0, 3 * driver.world.scene.cell_size], (3, 1)))

@@ -8,7 +8,7 @@ import pytest
 from hose_mj.errors import InputError
 from hose_mj.tasks.line import kernels as line_kernels
 from hose_mj.tasks.line.settings import DIRECTIONS
-from hose_mj.world.actions import STEPS, Actions, find_cells, find_centres
+from hose_mj.world.actions import STEPS, Actions, compute_cells, compute_centres
 from hose_mj.world.driving import Driver
 from hose_mj.world.registry import make_world
 
@@ -28,25 +28,25 @@ def test_names_and_steps_are_the_line_tasks():
 
 def test_cells_of_the_floor():
     world = make_world("floor_4")
-    cells = find_cells(world, world.site_positions())
+    cells = compute_cells(world, world.site_positions())
     assert cells.tolist() == [[2, 5, 0], [2, 3, 0], [3, 1, 0], [1, 2, 0], [0, 0, 0]]
-    assert find_centres(world, cells) == pytest.approx(world.site_positions())
+    assert compute_centres(world, cells) == pytest.approx(world.site_positions())
     edge = world.site_positions()[0] + [0.0249, -0.0249, 0.0]
-    assert find_cells(world, edge).tolist() == [2, 5, 0]
+    assert compute_cells(world, edge).tolist() == [2, 5, 0]
 
 
 def test_a_walk_through_cells_with_a_hose():
     world = make_world("floor_2")
     actions = Actions(Driver(world))
-    cells = actions.find_cells()
+    cells = actions.compute_cells()
     assert actions.names == (*DIRECTIONS, "none")
     for turn, action in enumerate(("left", "down", "right", "down", "none", "up")):
         robot = turn % 2
         act(actions, robot, action)
         cells[robot] += STEPS[action]
         assert not actions.stalled
-        assert actions.find_cells().tolist() == cells.tolist()
-        away = world.site_positions()[:-1] - find_centres(world, cells)
+        assert actions.compute_cells().tolist() == cells.tolist()
+        away = world.site_positions()[:-1] - compute_centres(world, cells)
         assert np.linalg.norm(away[robot]) <= 5e-3
         assert np.linalg.norm(away, axis=1).max() <= 1e-2
         assert np.linalg.norm(world.site_velocities()[robot]) <= 1e-2

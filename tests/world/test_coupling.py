@@ -8,8 +8,7 @@ from hose_mj.hoses.geds.integrators import SCHEMES
 from hose_mj.hoses.geds.point_masses import PointMasses
 from hose_mj.hoses.geds.shapes import ROW
 from hose_mj.scenes.mjcf.scene import find_scene, read_scene
-from hose_mj.world.coupling import Bodies
-from hose_mj.world.geds_world import GedsWorld
+from hose_mj.world.geds_world import Bodies, GedsWorld
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 IMPLICIT = [name for name in SCHEMES if name != "verlet"]
@@ -58,8 +57,8 @@ def test_compliance_is_the_derivative_of_a_step_while_contacts_stay(bodies):
     forces, change = rng.normal(size=(2, len(sites), 3))
     pair.begin()
     reached = pair.try_step(forces)
-    exact = pair.find_compliance(is_exact=True)
-    symmetric = pair.find_compliance(is_exact=False)
+    exact = pair.compute_compliance(is_exact=True)
+    symmetric = pair.compute_compliance(is_exact=False)
     step = 1e-4
     moved = (pair.try_step(forces + step * change) - reached).ravel() / step
     scale = np.abs(moved).max()

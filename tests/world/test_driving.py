@@ -45,10 +45,10 @@ class BareWorld(World):
             mujoco.mj_step(self.model, self.data)
         self._update_poses()
 
-    def position(self, arc_length):
+    def hose_position(self, arc_length):
         return self.centre_line().position(np.atleast_1d(arc_length))
 
-    def velocity(self, arc_length):
+    def hose_velocity(self, arc_length):
         return np.zeros((len(np.atleast_1d(arc_length)), 3))
 
     def tension(self, arc_length):
@@ -108,11 +108,11 @@ def test_no_speed_and_no_control_above_its_limit():
     fastest = 0.0
     for _ in range(2000):
         drive(driver, world.timestep)
-        fastest = max(fastest, driver.find_speed(0))
+        fastest = max(fastest, driver.compute_speed(0))
         assert np.all(np.abs(world.control) <= 20.0)
     # 2 w m (v_max - v) = c v
     assert fastest == pytest.approx(0.4 / (1.0 + 5.0 / (2.0 * WIDTH * 0.5)), rel=1e-3)
-    assert driver.find_error(0) < 1e-4
+    assert driver.compute_error(0) < 1e-4
 
 
 def test_a_weak_and_heavy_robot_does_not_overshoot(write_scene):
@@ -124,13 +124,13 @@ def test_a_weak_and_heavy_robot_does_not_overshoot(write_scene):
     for _ in range(4000):
         drive(driver, world.timestep)
         farthest = max(farthest, world.site_positions()[0, 0] - 1.0)
-        fastest = max(fastest, driver.find_speed(0))
+        fastest = max(fastest, driver.compute_speed(0))
         at_limit += abs(abs(world.control[0]) - 20.0) < 1e-9
     assert at_limit > 100
     # v^2 / 2 a at full strength a = F / m, then v^2 / a at half of it, make 0.2 m.
     assert fastest == pytest.approx(math.sqrt(0.2 * 0.5 / 1.5), rel=0.05)
     assert farthest < 0.2 * 1.02
-    assert driver.find_error(0) < 1e-3
+    assert driver.compute_error(0) < 1e-3
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def fling(write_scene, one, other, stiffness, timestep, scheme, duration):
         robots = 0.5 * float(mass @ world.data.qvel[[0, 1, 2, 6, 7, 8]] ** 2)
         energies.append(robots + world.hose.energies().total)
         world.step(10)
-        gaps.append(np.abs(world.site_positions() - world.position(world.arc_lengths)).max())
+        gaps.append(np.abs(world.site_positions() - world.hose_position(world.arc_lengths)).max())
     return max(energies) / energies[0], max(gaps)
 
 
@@ -61,7 +61,7 @@ def drive_at_random(world, duration, seed=0):
         if k % round(0.05 / world.timestep) == 0:
             world.control[:] = rng.uniform(low, high)
         world.step(10)
-        gap = np.abs(world.site_positions() - world.position(world.arc_lengths)).max()
+        gap = np.abs(world.site_positions() - world.hose_position(world.arc_lengths)).max()
         worst = max(worst, gap)
     return worst
 
@@ -89,7 +89,9 @@ def test_a_light_puck_pressed_to_a_wall_by_the_hose_stays_with_it(write_scene, t
         world.apply_force(0, (force, 0.0, 0.0))
         for _ in range(round(0.1 / timestep)):
             world.step()
-            gaps.append(np.abs(world.site_positions() - world.position(world.arc_lengths)).max())
+            gaps.append(
+                np.abs(world.site_positions() - world.hose_position(world.arc_lengths)).max()
+            )
     assert max(gaps) < 1e-6
 
 
@@ -164,7 +166,7 @@ def test_a_mesh_is_felt_like_the_box_that_it_is(write_scene):
     for geom, top in shapes:
         world = GedsWorld(write_scene(robots, geom, top=top, gravity="0 0 -9.81"))
         world.step(400)
-        lines.append(world.position(np.linspace(0.0, 1.0, 21)))
+        lines.append(world.hose_position(np.linspace(0.0, 1.0, 21)))
     assert lines[0][:, 2].min() < -0.1
     np.testing.assert_allclose(lines[1], lines[0], atol=2e-3)
 
@@ -177,11 +179,11 @@ def test_a_restored_world_goes_on_bit_by_bit(name):
     world.step(60)
     state = world.snapshot()
     world.step(40)
-    after = [world.snapshot(), world.position(np.linspace(0.0, world.scene.spec.length, 9))]
+    after = [world.snapshot(), world.hose_position(np.linspace(0.0, world.scene.spec.length, 9))]
     world.reset()
     world.restore(state)
     world.step(40)
-    again = [world.snapshot(), world.position(np.linspace(0.0, world.scene.spec.length, 9))]
+    again = [world.snapshot(), world.hose_position(np.linspace(0.0, world.scene.spec.length, 9))]
     np.testing.assert_array_equal(again[0]["mujoco"], after[0]["mujoco"])
     for part, values in after[0]["hose"]["hose"]["state"].items():
         np.testing.assert_array_equal(again[0]["hose"]["hose"]["state"][part], values)
@@ -189,7 +191,7 @@ def test_a_restored_world_goes_on_bit_by_bit(name):
     fresh = make_world(name)
     fresh.restore(state)
     fresh.step(40)
-    np.testing.assert_array_equal(fresh.position([0.5]), world.position([0.5]))
+    np.testing.assert_array_equal(fresh.hose_position([0.5]), world.hose_position([0.5]))
 
 
 def test_the_hose_rubs_on_what_turns_under_it(write_scene):
@@ -213,7 +215,7 @@ def test_the_hose_rubs_on_what_turns_under_it(write_scene):
 def test_the_centre_line_is_the_hose():
     world = make_world("floor_4")
     s = np.linspace(0.0, world.scene.spec.length, 57)
-    np.testing.assert_allclose(world.centre_line().position(s), world.position(s), atol=1e-12)
+    np.testing.assert_allclose(world.centre_line().position(s), world.hose_position(s), atol=1e-12)
 
 
 def test_mistakes_are_named_and_change_nothing():
@@ -235,3 +237,11 @@ def test_mistakes_are_named_and_change_nothing():
             make_world("floor_2", **options)
     with pytest.raises(InputError, match=r"model is .rope"):
         make_world("floor_2", "rope")
+
+
+def test_names_of_the_release_before_go_on_and_say_the_new_one():
+    world = make_world("floor_1")
+    for old, new in (("position", world.hose_position), ("velocity", world.hose_velocity)):
+        with pytest.warns(DeprecationWarning, match=f"hose_{old}"):
+            found = getattr(world, old)([0.2])
+        np.testing.assert_array_equal(found, new([0.2]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hose_mj.scenes.mjcf.scene import find_scene, read_scene
-from hose_mj.world.chain_fit import Pin, fit_chain
+from hose_mj.world.mujoco_world import Pin, fit_chain
 from hose_mj.world.registry import make_world
 
 MODELS = ("cable", "flex")
@@ -76,14 +76,14 @@ def test_a_hose_starts_at_its_robots_with_its_length(name, model):
     world = make_shipped(name, model)
     world.reset()
     assert world.start_gap < 1e-9
-    points = world.position(world.nodes)
+    points = world.hose_position(world.nodes)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     np.testing.assert_allclose(lengths, np.diff(world.nodes), atol=1e-9)
     line = world.centre_line()
     s = np.linspace(0.0, world.scene.spec.length, 97)
-    np.testing.assert_allclose(line.position(s), world.position(s), atol=1e-9)
+    np.testing.assert_allclose(line.position(s), world.hose_position(s), atol=1e-9)
     assert world.time == 0.0
-    assert not world.velocity(s).any()
+    assert not world.hose_velocity(s).any()
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -95,11 +95,11 @@ def test_robots_keep_the_hose_while_they_are_driven(name, model):
     world.control[:] = 0.1 * high * np.where(np.arange(len(high)) % 2, 1.0, -1.0)
     start = world.site_positions()
     world.step(round(0.1 / world.timestep))
-    gap = np.linalg.norm(world.position(world.arc_lengths) - world.site_positions(), axis=1)
+    gap = np.linalg.norm(world.hose_position(world.arc_lengths) - world.site_positions(), axis=1)
     assert gap.max() < {"cable": 5e-4, "flex": 1e-4}[model]
     assert np.abs(world.site_positions() - start)[:-1].max() > 1e-4
     np.testing.assert_array_equal(world.site_positions()[-1], start[-1])
-    speeds = world.velocity(world.arc_lengths) - world.site_velocities()
+    speeds = world.hose_velocity(world.arc_lengths) - world.site_velocities()
     assert np.abs(speeds).max() < 0.1
 
 
@@ -137,7 +137,7 @@ def test_all_models_swing_alike(make):
     for _ in range(3):
         for world in worlds:
             world.step(50)
-        places = np.array([world.position([0.2, 0.4, 0.8, 1.0]) for world in worlds])
+        places = np.array([world.hose_position([0.2, 0.4, 0.8, 1.0]) for world in worlds])
         assert np.abs(places[:2] - places[2]).max() < 0.02
     assert places[0, 2, 2] < 0.1  # from 0.5
 
@@ -193,11 +193,11 @@ def test_friction_holds_a_hose_on_a_slope_below_its_angle(make, model):
     for friction in (0.0, 0.1, 0.3):
         world = make(model, gravity="0 0 -9.6", friction=friction, geoms=floor, height=0.01)
         world.step(50)
-        start = world.position(world.nodes)
+        start = world.hose_position(world.nodes)
         world.model.opt.gravity[1] = 1.92
         world.step(100)
-        assert world.position(world.nodes)[:, 2].min() > 0.009
-        ways[friction] = np.abs(world.position(world.nodes) - start).max()
+        assert world.hose_position(world.nodes)[:, 2].min() > 0.009
+        ways[friction] = np.abs(world.hose_position(world.nodes) - start).max()
     assert ways[0.3] < 3e-3
     # Nothing goes further than free fall along the slope.
     assert ways[0.3] < 0.5 * ways[0.1] < 0.5 * 0.93 * ways[0.0]
@@ -209,7 +209,7 @@ def test_a_box_carries_what_lies_on_it(make, model):
     box = '<geom type="box" pos="0.2 0 0.4" size="0.06 0.3 0.04"/>'
     world = make(model, geoms=box, bend=1e-3)
     world.step(150)
-    points = world.position(np.linspace(0.0, 0.4, 81))
+    points = world.hose_position(np.linspace(0.0, 0.4, 81))
     above = np.abs(points[:, 0] - 0.2) < 0.06
     assert above.any()
     assert points[above, 2].min() == pytest.approx(0.44 + 0.01, abs=2e-3)

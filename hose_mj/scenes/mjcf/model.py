@@ -1,8 +1,20 @@
-"""A scene as MuJoCo compiled it: checks on the model's numbers, and the facts a `Scene` needs."""
+"""What MuJoCo makes of a scene: checks on its numbers, and the facts that a `Scene` needs.
+
+A scene is a stranger's file, and MuJoCo is native code: a file may crash it, hang it or eat all
+memory. `probe` has a child with limits (this module as a program) compile the scene, check the
+compiled numbers and take one step (`inspect_scene`); what comes back is a record of plain values,
+or one `InputError`.
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
+import tempfile
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +23,11 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.scenes.mjcf.files import shorten
 
+LONGEST = 20
+"""Seconds that the child may take."""
+LARGEST_MEMORY = 4 << 30
+"""Bytes of address space that the child may take."""
+_LARGEST_ANSWER = 4_000_000
 MOST = {"nbody": 2000, "ngeom": 5000, "nsite": 5000, "nv": 3000, "nu": 1000, "nnumeric": 1000}
 """Largest counts of a compiled scene."""
 LONGEST_STEP = 0.1
@@ -26,6 +43,42 @@ _NOT_NEGATIVE = (
     *("body_mass", "body_inertia", "jnt_stiffness", "dof_damping", "dof_frictionloss"),
     *("dof_armature", "geom_friction", "tendon_stiffness", "tendon_damping"),
 )
+
+
+def probe(path: Path) -> dict[str, Any]:
+    """Returns what `inspect_scene` finds in a scene, asked in a child process.
+
+    Raises:
+        InputError: what it raised there; or a scene that crashed the child or exceeded its limits.
+    """
+    thing, name = "file", shorten(path.name)
+    valid = f"a scene that MuJoCo compiles within {LONGEST} s and {LARGEST_MEMORY >> 30} GiB"
+    package = str(Path(__file__).resolve().parents[2])
+    known = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(known), "OMP_NUM_THREADS": "1"}
+    with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log where it runs
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", __spec__.name, str(path)],
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                timeout=2 * LONGEST,
+                check=False,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise InputError(thing, name, f"{valid} (it took longer)") from error
+    lines = done.stdout[-_LARGEST_ANSWER:].splitlines()
+    try:
+        answer = json.loads(lines[-1])
+    except (IndexError, ValueError) as error:
+        why = f"its process ended with status {done.returncode}"
+        raise InputError(thing, name, f"{valid} ({why})") from error
+    if "error" in answer:
+        raise InputError(*answer["error"])
+    return dict(answer)
 
 
 def inspect_scene(path: Path) -> dict[str, Any]:
@@ -52,9 +105,7 @@ def inspect_scene(path: Path) -> dict[str, Any]:
     _check_counts(model, file)
     _check_numbers(model, file)
     data = mujoco.MjData(model)
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, START)
-    if key >= 0:
-        mujoco.mj_resetDataKeyframe(model, data, key)
+    reset_to_start(model, data)
     mujoco.mj_forward(model, data)
     sites = [
         {
@@ -73,6 +124,17 @@ def inspect_scene(path: Path) -> dict[str, Any]:
         "texts": dict(_read_text(model, i) for i in range(model.ntext)),
         "tuples": {model.tuple(i).name: _list_sites(model, i) for i in range(model.ntuple)},
     }
+
+
+def reset_to_start(model: Any, data: Any) -> None:
+    """Resets MuJoCo's data to the state in which a scene starts; poses do not follow yet."""
+    import mujoco
+
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, START)
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    else:
+        mujoco.mj_resetData(model, data)
 
 
 def _check_counts(model: Any, file: str) -> None:
@@ -152,3 +214,38 @@ def _list_sites(model: Any, index: int) -> list[str]:
         else ""
         for k in elements
     ]
+
+
+def limit_resources() -> None:
+    """Bounds the time, memory and files of this process, where the system can."""
+    try:
+        import resource
+    except ImportError:
+        return
+    for which, most in (
+        (resource.RLIMIT_CPU, LONGEST),
+        (resource.RLIMIT_AS, LARGEST_MEMORY),
+        (resource.RLIMIT_FSIZE, 1 << 20),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        with suppress(ValueError, OSError):
+            resource.setrlimit(which, (most, most))
+
+
+def _main(path: Path) -> None:
+    """Prints what is found in a scene, or its error, as the last line: one JSON document."""
+    limit_resources()
+    try:
+        answer = inspect_scene(path)
+    except InputError as error:
+        value = error.value
+        plain = value if isinstance(value, (str, int, float, type(None))) else repr(value)
+        answer = {"error": [error.thing, plain, error.valid]}
+    except MemoryError:
+        valid = f"a scene that takes at most {LARGEST_MEMORY >> 30} GiB"
+        answer = {"error": ["file", shorten(path.name), valid]}
+    sys.stdout.write("\n" + json.dumps(answer) + "\n")
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]))

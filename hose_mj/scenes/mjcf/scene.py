@@ -8,20 +8,32 @@ by `<custom>` numerics and a named material. All else is plain MJCF that MuJoCo 
 from __future__ import annotations
 
 import math
+import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from hose_mj.assets import find_assets
 from hose_mj.errors import InputError
+from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, read_catalogue
 from hose_mj.hoses.spec import HoseSpec
+from hose_mj.scenes.hose_file.spec import LENGTHS, read_spec
+from hose_mj.scenes.mjcf.catalogue import find_named, find_scene, list_scenes
 from hose_mj.scenes.mjcf.files import read_files, shorten
-from hose_mj.scenes.mjcf.hose import HOSE_NUMERICS, HOSE_TEXT, read_hose
-from hose_mj.scenes.mjcf.probe import probe
-from hose_mj.scenes.mjcf.robots import SITE, SOURCE, Place, Robot, find_one, find_robots
+from hose_mj.scenes.mjcf.model import probe
+from hose_mj.toml_table import LARGEST_NUMBER, TomlTable
 
+__all__ = ["Place", "Robot", "Scene", "find_scene", "list_scenes", "read_scene"]
+
+SITE = "site"
+SOURCE = "hose_source"
+ATTACH = "hose_attach"
+ORDER = "hose_robots"
+"""Name of the tuple of sites that gives the robots' order, where names do not."""
+_SEPARATORS = "/_.-"
+_NUMBER = re.compile(r"\d{1,6}(?=\D*\Z)", re.ASCII)
 GOAL = "goal"
 ATTACHMENTS = "hose_attachments"
 FRICTION = "hose_friction"
@@ -30,10 +42,58 @@ CELL_SIZE = "cell_size"
 DEFAULT_FRICTION = 0.3
 CELLS_ALONG_HOSE = 16
 """Cells that the hose is long where the scene does not say how wide a cell is (thesis B.2)."""
-_NUMERICS = (*HOSE_NUMERICS, ATTACHMENTS, FRICTION)
 _ROUNDING = 1e-9
+_OUTER, _OLD_OUTER = "hose_outer_radius", "hose_radius"
+_RADII = {_OUTER: "outer_diameter", "hose_inner_radius": "inner_diameter"}
+_KEYS = tuple(
+    key
+    for key in dict.fromkeys((*MATERIAL_KEYS, *HOSE_KEYS))
+    if key not in ("outer_radius", *_RADII.values())
+)
+_MAY_BE_NEGATIVE = ("hose_rest_strain", "hose_rest_curvature", "hose_rest_torsion")
+_MAY_BE_ZERO = (
+    *("hose_poisson_ratio", "hose_inner_radius", "hose_contents_density"),
+    *("hose_damping_time", "hose_drag", "hose_torsional_stiffness"),
+)
+HOSE_NUMERICS = ("hose_length", *_RADII, *(f"hose_{key}" for key in _KEYS), _OLD_OUTER)
+"""Names of the numerics that describe the hose itself, one number each, in SI units; the last one
+is deprecated."""
+HOSE_TEXT = "hose_material"
+"""Name of the text that names a material or a ready hose of materials.toml."""
+_RANGE = f"a number from {LENGTHS[0]:g} to {LENGTHS[1]:g} (m)"
+_NUMERICS = (*HOSE_NUMERICS, ATTACHMENTS, FRICTION)
 
 Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A site.
+
+    Attributes:
+        site: its name.
+        body: the name of its body.
+        position: where it is at the start (m).
+        moves: whether its body can move.
+    """
+
+    site: str
+    body: str
+    position: tuple[float, float, float]
+    moves: bool
+
+
+@dataclass(frozen=True)
+class Robot(Place):
+    """A robot, by the site where it holds the hose.
+
+    Attributes:
+        name: the prefix of its site ("robot0"), or its body's name where there is none.
+        arc_length: where it holds the hose, from the source (m).
+    """
+
+    name: str
+    arc_length: float
 
 
 @dataclass(frozen=True)
@@ -77,36 +137,16 @@ class Scene:
         return mujoco.MjSpec.from_file(str(self.path))
 
 
-def find_scene(name: str | Path) -> Path:
-    """Returns the path of a shipped scene by its name ("floor_4"), or of a file that is there.
-
-    Raises:
-        InputError: neither.
-    """
-    path = Path(name)
-    shipped = find_assets() / "scenes" / f"{name}.xml"
-    if path.suffix != ".xml" and len(path.parts) == 1 and shipped.is_file():
-        return shipped
-    if path.is_file():
-        return path
-    raise InputError("scene", str(name), f"an MJCF file, or one of {', '.join(list_scenes())}")
-
-
-def list_scenes() -> tuple[str, ...]:
-    """Names of the shipped scenes."""
-    return tuple(sorted(path.stem for path in (find_assets() / "scenes").glob("*.xml")))
-
-
 def read_scene(path: str | Path) -> Scene:
     """Reads and checks a scene; MuJoCo sees it first in a child process with limits.
 
     Args:
-        path: an MJCF file.
+        path: an MJCF file, or the name of a scene (`list_scenes`).
 
     Raises:
         InputError: the first thing that is wrong: file, element, value and what would be valid.
     """
-    files = read_files(Path(path))
+    files = read_files(find_named(path) or Path(path))
     facts = probe(files.path)
     file = shorten(files.path.name)
     numerics = facts["numerics"]
@@ -197,3 +237,188 @@ def _check_inside(bounds: tuple[Vector, Vector], places: Sequence[Place], file: 
             at = tuple(round(x, 6) for x in place.position)
             thing = f"{file}: position of {SITE} {place.site}"
             raise InputError(thing, at, f"within the bounds, {low} to {high} (m)")
+
+
+def find_one(places: Sequence[Place], name: str, file: str) -> Place:
+    """Returns the one site of a name, with any prefix.
+
+    Raises:
+        InputError: none or several.
+    """
+    found = [place for place in places if _split(place.site, name) is not None]
+    if len(found) != 1:
+        valid = f"one <site name='{name}'/>, a prefix such as 'arena/' allowed"
+        raise InputError(f"{file}: sites {name}", [shorten(p.site) for p in found[:8]], valid)
+    return found[0]
+
+
+def find_robots(
+    places: Sequence[Place],
+    tuples: Mapping[str, Sequence[str]],
+    attachments: Sequence[float] | None,
+    length: float,
+    file: str,
+) -> tuple[Robot, ...]:
+    """Returns the robots, the tip's first.
+
+    The order is that of the sites in the tuple `hose_robots` where the scene has it. Otherwise each
+    robot's number is the last number in the prefix of its site or, without one, in its body's name,
+    and the numbers are 0 to N - 1; a single robot needs none. Robot i holds the hose at
+    L (N - i) / N from the source, so that the segments are equal, or at the i-th of `attachments`.
+
+    Raises:
+        InputError: no robots, a robot that cannot move or has two sites, numbers that are not
+            0 to N - 1, attachments that do not fall from the tip to the source.
+    """
+    found = {p.site: p for p in places if _split(p.site, ATTACH) is not None}
+    if not found:
+        valid = f"one in each robot's body, <site name='{ATTACH}'/>, prefixes allowed"
+        raise InputError(f"{file}: sites {ATTACH}", None, valid)
+    bodies: dict[str, str] = {}
+    for place in found.values():
+        thing = f"{file}: site {shorten(place.site)}"
+        if not place.moves:
+            raise InputError(thing, shorten(place.body), "in a body that joints let move")
+        if place.body and place.body in bodies:
+            valid = f"one in a body; {shorten(bodies[place.body])} is in this one too"
+            raise InputError(thing, shorten(place.body), valid)
+        bodies[place.body] = place.site
+    order = tuples.get(ORDER)
+    ordered = _order_by_number(found, file) if order is None else _order_by(order, found, file)
+    arcs = _check_attachments(attachments, len(ordered), length, file)
+    return tuple(
+        Robot(p.site, p.body, p.position, p.moves, _split(p.site, ATTACH) or p.body, arc)
+        for p, arc in zip(ordered, arcs, strict=True)
+    )
+
+
+def _split(site: str, name: str) -> str | None:
+    """The prefix of a site without its separator; None for a site of another name."""
+    prefix = site.removesuffix(name)
+    if prefix == site or (prefix and prefix[-1] not in _SEPARATORS):
+        return None
+    return prefix[:-1]
+
+
+def _order_by(order: Sequence[str], found: Mapping[str, Place], file: str) -> list[Place]:
+    if sorted(order) != sorted(found):
+        valid = "each of the sites " + ", ".join(map(shorten, found)) + " once"
+        raise InputError(f"{file}: tuple {ORDER}", [shorten(s) for s in order[:8]], valid[:500])
+    return [found[site] for site in order]
+
+
+def _order_by_number(found: Mapping[str, Place], file: str) -> list[Place]:
+    if len(found) == 1:
+        return list(found.values())
+    numbered: dict[int, Place] = {}
+    for place in found.values():
+        match = _NUMBER.search(_split(place.site, ATTACH) or place.body)
+        number = int(match.group()) if match else None
+        if number is None or number >= len(found) or number in numbered:
+            thing = f"{file}: number of the robot with site {shorten(place.site)}"
+            valid = f"each of 0 (tip) to {len(found) - 1} (next to the source) once, or a tuple"
+            raise InputError(thing, number, f"{valid} {ORDER}")
+        numbered[number] = place
+    return [numbered[i] for i in range(len(found))]
+
+
+def _check_attachments(
+    given: Sequence[float] | None, n: int, length: float, file: str
+) -> tuple[float, ...]:
+    if given is None:
+        return tuple(length * ((n - i) / n) for i in range(n))
+    ends = (*given, 0.0)
+    falls = all(a > b for a, b in pairwise(ends))
+    if len(given) != n or not falls or given[0] > length:
+        valid = f"{n} numbers, the tip's first, falling, above 0 and at most {length:g} (m)"
+        raise InputError(f"{file}: numeric hose_attachments", tuple(given[:8]), valid)
+    return tuple(given)
+
+
+def read_hose(
+    numerics: Mapping[str, Sequence[float]], texts: Mapping[str, str], file: str
+) -> HoseSpec:
+    """Returns the hose that a scene describes.
+
+    A named material or ready hose gives numbers first, and the scene's numerics replace them.
+
+    Args:
+        numerics: the scene's numerics of `HOSE_NUMERICS` by name.
+        texts: the scene's texts by name.
+        file: name of the scene's file, for messages.
+
+    Raises:
+        InputError: a number out of range, too few of them, or an unknown material.
+    """
+    given = {
+        name: _check_numeric(name, numerics[name], file)
+        for name in HOSE_NUMERICS
+        if name in numerics
+    }
+    if _OLD_OUTER in given:
+        _warn_of_radius(given, file)
+    if "hose_length" not in given:
+        valid = f"<custom><numeric name='hose_length' data='...'/>, {_RANGE}"
+        raise InputError(f"{file}: numeric hose_length", None, valid)
+    radius, inner = given.get(_OUTER), given.get("hose_inner_radius")
+    if inner is not None and radius is not None and inner >= radius:
+        valid = f"below {_OUTER}, {radius:g} m"
+        raise InputError(f"{file}: numeric hose_inner_radius", inner, valid)
+    values: dict[str, object] = {"length": given["hose_length"]}
+    values |= {key: given[f"hose_{key}"] for key in _KEYS if f"hose_{key}" in given}
+    values |= {key: 2.0 * given[name] for name, key in _RADII.items() if name in given}
+    values |= _find_material(texts, file)
+    try:
+        return read_spec(TomlTable(values, file))
+    except InputError as error:
+        raise _rename_error(error, given, file) from error
+
+
+def _warn_of_radius(given: dict[str, float], file: str) -> None:
+    """Takes the old name of the outer radius, for one release."""
+    if _OUTER in given:
+        valid = f"left out where {_OUTER} is given"
+        raise InputError(f"{file}: numeric {_OLD_OUTER}", given[_OLD_OUTER], valid)
+    text = f"{file}: numeric {_OLD_OUTER} is deprecated: write {_OUTER}"
+    warnings.warn(text, DeprecationWarning, stacklevel=2)
+    given[_OUTER] = given.pop(_OLD_OUTER)
+
+
+def _check_numeric(name: str, data: Sequence[float], file: str) -> float:
+    thing = f"{file}: numeric {name}"
+    if len(data) != 1:
+        raise InputError(thing, tuple(data[:4]), "one number")
+    value = float(data[0])
+    if name == "hose_length":
+        valid, is_valid = _RANGE, LENGTHS[0] <= value <= LENGTHS[1]
+    elif name in _MAY_BE_NEGATIVE:
+        valid, is_valid = "a finite number", True
+    elif name in _MAY_BE_ZERO:
+        valid, is_valid = "a finite number at or above 0", value >= 0.0
+    else:
+        valid, is_valid = "a finite number above 0", value > 0.0
+    if not (is_valid and math.isfinite(value) and abs(value) <= LARGEST_NUMBER):
+        raise InputError(thing, value, valid)
+    return value
+
+
+def _find_material(texts: Mapping[str, str], file: str) -> dict[str, str]:
+    name = texts.get(HOSE_TEXT)
+    if name is None:
+        return {}
+    catalogue = read_catalogue()
+    if name in catalogue.hoses:
+        return {"like": name}
+    if name in catalogue.materials:
+        return {"material": name}
+    valid = "one of " + ", ".join((*catalogue.hoses, *catalogue.materials))
+    raise InputError(f"{file}: text {HOSE_TEXT}", name[:80], valid)
+
+
+def _rename_error(error: InputError, given: Mapping[str, float], file: str) -> InputError:
+    """Says the same in the words of a scene: numerics for TOML's keys, radii for diameters."""
+    key = error.thing.rsplit(" ", 1)[-1].rsplit(".", 1)[-1]
+    names = {key: name for name, key in _RADII.items()}
+    name = names.get(key, f"hose_{key}")
+    valid = error.valid.replace("outer_diameter", _OUTER)
+    return InputError(f"{file}: numeric {name}", given.get(name, error.value), valid)

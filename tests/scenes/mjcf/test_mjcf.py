@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf import files as mjcf_files
-from hose_mj.scenes.mjcf import probe as mjcf_probe
+from hose_mj.scenes.mjcf import model as mjcf_model
 from hose_mj.scenes.mjcf.files import DEEPEST, LARGEST_XML, MOST_ELEMENTS, MOST_NAMED, read_files
-from hose_mj.scenes.mjcf.hose import HOSE_NUMERICS
-from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+from hose_mj.scenes.mjcf.scene import HOSE_NUMERICS, find_scene, read_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 HOSE = """
@@ -428,9 +427,9 @@ def test_a_crash_and_a_hang_become_errors(write, monkeypatch, tmp_path):
     crash.write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     (package / "hang_probe.py").write_text("import time; time.sleep(60)")
     monkeypatch.setenv("PYTHONPATH", str(package))
-    monkeypatch.setattr(mjcf_probe, "LONGEST", 0.5)
+    monkeypatch.setattr(mjcf_model, "LONGEST", 0.5)
     for module, what in (("crash_probe", "status -11"), ("hang_probe", "it took longer")):
-        monkeypatch.setattr(mjcf_probe.__spec__, "name", module)
+        monkeypatch.setattr(mjcf_model.__spec__, "name", module)
         assert what in complain(path)
 
 

@@ -1,26 +1,31 @@
-"""`HoseTouch`: contact between a spline hose and the geoms of a scene, both ways.
+"""`GedsContact`: contact between a spline hose and the geoms of a scene, both ways.
 
 The hose takes contact implicitly, with geoms where they are at the beginning of the step. What it
 does to bodies that can move acts on them in the next step, so that momentum is kept but for that
-delay.
+delay. Meshes and ellipsoids are geoms that only MuJoCo can measure (`GeomMeter`).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.protocol import Array
-from hose_mj.world.measured_geoms import Distances, GeomMeter
 from hose_mj.world.scene_geoms import SceneGeoms
 
 _REACH = 2.0
 """Meshes nearer than so many radii of the hose are measured."""
+PROBE = "hose_mj_probe"
+"""Name of a geom, a small sphere that touches nothing, which stands for a point of the hose."""
+_PROBE_RADIUS = 1e-4
+"""Small beside a hose (m); taken off the distances that MuJoCo finds."""
 
 
-class HoseTouch:
-    """The scene's geoms as a hose feels them.
+class GedsContact:
+    """Hands a scene's geoms to a spline hose as obstacles, and what it does to them to MuJoCo.
 
     Args:
         model, data: MuJoCo's, poses as at the start.
@@ -68,7 +73,7 @@ class HoseTouch:
         self.place()
 
     def snapshot(self) -> dict[str, Array]:
-        """What the next step depends on beyond the hose and MuJoCo's state."""
+        """Returns what the next step depends on beyond the hose and MuJoCo's state."""
         return {
             "pushes": self.pushes.copy(),
             "measured_forces": self._measured_forces.copy(),
@@ -144,3 +149,75 @@ class HoseTouch:
             mujoco.mj_applyFT(
                 *(self._model, self._data, force, np.zeros(3), points[q], body, generalized)
             )
+
+
+class Distances(NamedTuple):
+    """Signed distances (Q,), m; outward normals (Q, 3); the nearest geoms (Q,), -1 for none."""
+
+    distances: Array
+    normals: Array
+    geoms: np.ndarray
+
+    @classmethod
+    def none(cls, count: int) -> Distances:
+        """Nothing is near any of the points."""
+        return cls(np.full(count, np.inf), np.zeros((count, 3)), np.full(count, -1))
+
+
+def add_probe(spec: mujoco.MjSpec) -> None:
+    """Adds the geom that stands for a point of the hose."""
+    spec.worldbody.add_geom(
+        name=PROBE,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[_PROBE_RADIUS, 0.0, 0.0],
+        contype=0,
+        conaffinity=0,
+        group=5,
+        rgba=[0.0, 0.0, 0.0, 0.0],
+    )
+
+
+class GeomMeter:
+    """Measures points against some geoms of a model.
+
+    Args:
+        model: with the geom of `add_probe`.
+        geoms: ids, (M,).
+        touched: whether each geom counts at each of the points, (M, Q).
+        reach: beyond this distance nothing is measured (m).
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, geoms: np.ndarray, touched: np.ndarray, reach: float
+    ) -> None:
+        self._model, self._geoms, self._reach = model, geoms, reach
+        self._touched = touched
+        self._scratch = mujoco.MjData(model)
+        self._probe = model.geom(PROBE).id
+
+    def measure(self, data: mujoco.MjData, points: Array) -> Distances:
+        """Distances of points (Q, 3), m, from the nearest of the geoms; `reach` where none is near.
+
+        Poses are those in `data`.
+        """
+        scratch, model = self._scratch, self._model
+        scratch.geom_xpos[:], scratch.geom_xmat[:] = data.geom_xpos, data.geom_xmat
+        distances = np.full(len(points), self._reach)
+        normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+        nearest = np.full(len(points), -1)
+        ends = np.zeros(6)
+        for g, touched in zip(self._geoms, self._touched, strict=True):
+            away = np.linalg.norm(points - data.geom_xpos[g], axis=1)
+            for q in np.flatnonzero(touched & (away < model.geom_rbound[g] + self._reach)):
+                scratch.geom_xpos[self._probe] = points[q]
+                found = mujoco.mj_geomDistance(
+                    model, scratch, int(g), self._probe, float(distances[q]), ends
+                )
+                if found + _PROBE_RADIUS >= distances[q]:
+                    continue
+                arrow = ends[3:] - ends[:3]
+                length = float(np.linalg.norm(arrow))
+                if length > 0.0:
+                    normals[q] = arrow / length * np.sign(found)
+                distances[q], nearest[q] = found + _PROBE_RADIUS, g
+        return Distances(distances, normals, nearest)

@@ -153,7 +153,7 @@ def examine_python(wanted: SpecifierSet) -> Finding:
 
 
 def examine_dependency(requirement: Requirement, extra: str = "") -> Finding:
-    """Holds the installed version of a package against the wanted range; an extra's may be absent."""
+    """Holds the installed version of a package against the wanted range; only warns of an extra."""
     name, wanted = requirement.name, requirement.specifier
     remedy = f"pip install 'hose-mj[{extra}]'" if extra else f'pip install "{requirement}"'
     shown = f"{name} (extra {extra})" if extra and name == "mujoco" else name

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import io
 import os
+import re
 import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, redirect_stderr, suppress
+from contextlib import ExitStack, nullcontext, redirect_stderr, redirect_stdout, suppress
 from typing import Any, Protocol, TextIO, cast
 
 import hose_mj
@@ -113,7 +115,6 @@ def _suggest(error: HoseError) -> str:
     if not isinstance(error, InputError) or not isinstance(error.value, str):
         return ""
     import difflib
-    import re
 
     known = re.findall(r"[\w.-]+", error.valid)
     near = difflib.get_close_matches(error.value, known, n=1, cutoff=0.7)
@@ -202,26 +203,37 @@ def parse_arguments(name: str, arguments: type[Any], words: Sequence[str]) -> An
     """Returns the `Args` of a sub-command that its words describe."""
     import tyro
 
+    asks = bool({"-h", "--help"} & set(words))
+    shown = io.TextIOWrapper(io.BytesIO(), getattr(sys.stdout, "encoding", None) or "utf-8")
     try:
-        return tyro.cli(
-            arguments,
-            prog=f"hose-mj {name}",
-            description=_wrap(arguments.__doc__ or ""),
-            args=list(words),
-            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
-        )
-    except SystemExit as stop:
-        if not stop.code and {"-h", "--help"} & set(words) and name in COMMANDS:
-            lines = "\n".join(f"  {line}" for line in COMMANDS[name].examples)
-            print(f"\nexamples:\n{lines}\n\n{_wrap(ENDING)}")
+        with redirect_stdout(shown) if asks else nullcontext():
+            return tyro.cli(
+                arguments,
+                prog=f"hose-mj {name}",
+                args=list(words),
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
+            )
+    except SystemExit:
+        if asks:
+            shown.seek(0)
+            print(_finish_help(name, shown.read()), end="")
         raise
+
+
+def _finish_help(name: str, text: str) -> str:
+    """The help of a sub-command, wrapped, with examples, without defaults that say nothing."""
+    empty = re.compile(r"\(default: (None|False|)\)")
+    lines = [empty.sub(lambda found: " " * len(found.group()), line) for line in text.splitlines()]
+    lines = [line if line[:1] in "│╭╰|+" else _wrap(line) for line in lines]
+    examples = COMMANDS[name].examples if name in COMMANDS else ()
+    lines += ["", "examples:", *(f"  {line}" for line in examples), ""] if examples else []
+    return "\n".join([*lines, _wrap(ENDING), ""])
 
 
 def _wrap(text: str) -> str:
     """Returns paragraphs that fit into the terminal."""
     width = min(100, max(40, shutil.get_terminal_size().columns))
-    paragraphs = textwrap.dedent(f"    {text}").strip().split("\n\n")
-    return "\n\n".join(textwrap.fill(" ".join(one.split()), width) for one in paragraphs)
+    return "\n\n".join(textwrap.fill(" ".join(one.split()), width) for one in text.split("\n\n"))
 
 
 def make_help() -> str:

@@ -212,8 +212,8 @@ def test_a_module_of_an_extra_that_is_imported_late(fake_command, capsys, monkey
 
 def test_quiet_leaves_results_and_errors(fake_command, capsys):
     def run(args):
-        print("progress", file=sys.stderr)
-        print("result")
+        sys.stderr.write("progress\n")
+        sys.stdout.write("result\n")
         raise StepError("step 3 diverged")
 
     fake_command.run = run

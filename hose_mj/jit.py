@@ -42,7 +42,7 @@ def _keep_known(**options: bool) -> dict[str, bool]:
     known = {}
     for name, value in options.items():
         try:
-            CPUTargetOptions.parse_as_flags(Flags(), {name: value})
+            CPUTargetOptions.parse_as_flags(Flags(), {name: value})  # type: ignore[no-untyped-call]
         except Exception:  # whatever a later version raises, kernels compile without it
             continue
         known[name] = value
@@ -145,7 +145,7 @@ def choose_by_unknowns(choices: Mapping[int, Any]) -> Any:
     return chosen
 
 
-class _Notice(event.Listener):  # type: ignore[misc]
+class _Notice(event.Listener):
     """Says on stderr that kernels are being compiled: once in a process, and only if any are.
 
     numba tells of a compilation, not of what it loads from the disk. A stage is a kernel that is
@@ -181,7 +181,7 @@ class _Notice(event.Listener):  # type: ignore[misc]
 
 
 _NOTICE = _Notice()
-event.register("numba:compile", _NOTICE)
+event.register("numba:compile", _NOTICE)  # type: ignore[no-untyped-call]
 
 
 def count_compiled() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import io
 import os
@@ -87,7 +88,8 @@ def _run_reporting(words: list[str]) -> int:
         if error.errno is None and error.strerror is None and not isinstance(error, TimeoutError):
             raise  # not the operating system's: a bug
         _complain(_describe_refusal(error))
-        return REFUSED
+        full = error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF)
+        return BAD_INPUT if full and not _can_print() else REFUSED
     except MemoryError as error:
         _complain(f"not enough memory{f': {error}' if str(error) else ''}")
         return REFUSED
@@ -95,6 +97,9 @@ def _run_reporting(words: list[str]) -> int:
         print("hose-mj: interrupted", file=sys.stderr)
         return INTERRUPTED
     except SystemExit as stop:  # how tyro ends after --help or a wrong argument
+        if isinstance(stop.__context__, BrokenPipeError):  # and rich where nobody reads on
+            _drop_output()
+            return PIPE_CLOSED
         return stop.code if isinstance(stop.code, int) else DONE
 
 
@@ -108,6 +113,16 @@ def _describe_refusal(error: OSError) -> str:
     names = [str(name) for name in (error.filename, error.filename2) if name is not None]
     reason = error.strerror or str(error)
     return " ".join(f"{', '.join(names)}{': ' * bool(names)}{reason}".split())
+
+
+def _can_print() -> bool:
+    """Says whether stdout takes what is written: where it goes is part of the command line."""
+    try:
+        print(flush=True)
+    except OSError:
+        _drop_output()
+        return False
+    return True
 
 
 def _suggest(error: HoseError) -> str:

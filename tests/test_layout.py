@@ -23,6 +23,7 @@ _WORLD = _SCENES | {"hose_mj.hoses", "hose_mj.scenes"}
 _CONSTRAINTS = _WORLD | {"hose_mj.world"}
 FLOORS = {
     "hose_mj": {"hose_mj.errors", "hose_mj.hoses.registry", "hose_mj.hoses.spec"},
+    "hose_mj.__main__": {"hose_mj.cli"},
     "hose_mj.errors": set(),
     "hose_mj.assets": {"hose_mj.errors"},
     "hose_mj.checks": {"hose_mj.errors"},

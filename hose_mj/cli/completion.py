@@ -94,7 +94,7 @@ def collect_words() -> dict[str, dict[str, list[str]]]:
             names[kind] = [name for name in KINDS[kind]() if name.islower() or "/" in name]
         except (HoseError, ImportError):  # an extra that is not here
             names[kind] = []
-    found = {}
+    found: dict[str, dict[str, list[str]]] = {}
     for command, entry in COMMANDS.items():
         try:
             arguments = importlib.import_module(entry.module).Args

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 import tyro
@@ -44,7 +45,7 @@ def run(args: Args) -> int:
     jobs = {f"{g}: {n}": job for g in args.groups or GROUPS for n, job in GROUPS[g]().items()}
     from hose_mj.jit import count_compiled
 
-    records = []
+    records: list[dict[str, Any]] = []
     with show_progress("kernels", len(jobs)) as advance:
         for name, job in jobs.items():
             begun, before = time.perf_counter(), count_compiled()
@@ -71,8 +72,8 @@ def list_hose_jobs() -> dict[str, Job]:
     for plane in ("xz", None):
         where = "in space" if plane is None else "in a plane"
         for scheme in SCHEMES:
-            jobs[f"{where}, {scheme}"] = lambda p=plane, s=scheme: _use_hose(plane=p, scheme=s)
-    jobs["in space, an angle at every control point"] = lambda: _use_hose(twist="theta")
+            jobs[f"{where}, {scheme}"] = partial(_use_hose, plane=plane, scheme=scheme)
+    jobs["in space, an angle at every control point"] = partial(_use_hose, twist="theta")
     jobs["in a plane, verlet"] = _use_verlet
     return jobs
 
@@ -119,7 +120,7 @@ def list_world_jobs() -> dict[str, Job]:
     """Every shipped scene: a few steps with the monitor."""
     from hose_mj.scenes.mjcf.scene import list_scenes
 
-    return {name: lambda name=name: _use_world(name) for name in list_scenes()}
+    return {name: partial(_use_world, name) for name in list_scenes()}
 
 
 def _use_world(scene: str) -> None:
@@ -144,12 +145,11 @@ def list_learn_jobs() -> dict[str, Job]:
 
     pairs = {task: NAMED_LEARNERS.get(task, "d-rr-ql") for task in TASKS}
     jobs: dict[str, Job] = {
-        f"task {task}": lambda task=task, id=id: _use_learner(task, id)
-        for task, id in pairs.items()
+        f"task {task}": partial(_use_learner, task, id) for task, id in pairs.items()
     }
     for id, entry in catalog.LEARNERS.items():
         task = "taxi" if entry.schedule == "joint" else "corridor"
-        jobs[f"learner {id}"] = lambda task=task, id=id: _use_learner(task, id)
+        jobs[f"learner {id}"] = partial(_use_learner, task, id)
     return jobs
 
 

@@ -3,6 +3,7 @@
 VENV ?= .venv
 PYTHON ?=
 PYTEST_ARGS ?=
+MATRIX_ARGS ?=
 # Tests run in this many processes, the tests of a file in one of them.
 PYTEST_WORKERS ?= 2
 
@@ -14,21 +15,25 @@ PINS := pyproject.toml constraints.txt
 NEXT_VENV := $(VENV)-mujoco4
 NEXT_BIN := $(NEXT_VENV)/bin
 NEXT := $(NEXT_VENV)/.installed
+comma := ,
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow test-mujoco4 lint clean
+.PHONY: help demo test test-slow smoke-mujoco4 test-mujoco4 test-matrix lint clean
 
 help:
 	@echo 'make demo        install, then compare the hose models in short form (report in out/demo)'
 	@echo '                 and on a garden hose (report in out/demo/garden_hose)'
-	@echo 'make test        install with the dev extra, then ruff, mypy and pytest'
-	@echo '                 PYTEST_ARGS="tests/cli -x" goes to pytest'
+	@echo 'make test        install with the dev extra, then ruff, mypy, pytest, and the smoke tests'
+	@echo '                 under MuJoCo 4 (smoke-mujoco4); PYTEST_ARGS="tests/cli -x" goes to pytest'
 	@echo 'make test-slow   only the slow tests, which make test leaves out'
-	@echo 'make test-mujoco4  the flex rod and GEDS under MuJoCo 4, in a virtual environment of its own'
+	@echo 'make test-mujoco4  the smoke tests, the flex rod and the contracts of all models under MuJoCo 4,'
+	@echo '                 in a virtual environment of its own'
+	@echo 'make test-matrix   each Python here, times MuJoCo 3.17 and 4, in fresh environments (slow);'
+	@echo '                 writes the table of docs/install.md'
 	@echo 'make lint        only ruff and mypy'
 	@echo 'make clean       remove $(VENV), $(NEXT_VENV), build products, caches and out/demo (runs are kept)'
 	@echo ''
-	@echo 'PYTHON=/path/to/python picks the interpreter (3.11 or 3.12) of a new $(VENV);'
+	@echo 'PYTHON=/path/to/python picks the interpreter (3.11 to 3.14) of a new $(VENV);'
 	@echo 'VENV=folder puts it elsewhere. uv installs if it is on the PATH, pip otherwise.'
 
 # Status 1 means that a check failed, which the table shows: the report is there all the same.
@@ -38,14 +43,22 @@ demo: $(CORE)
 
 test: lint
 	$(BIN)/python -m pytest --numprocesses $(PYTEST_WORKERS) --dist loadfile $(PYTEST_ARGS)
+	$(if $(PYTEST_ARGS),,$(MAKE) smoke-mujoco4)
 
 test-slow: $(DEV)
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 
-# Under MuJoCo 4 dm-control does not load and the composite cable is gone: only what is left runs.
-test-mujoco4: $(NEXT)
-	$(NEXT_BIN)/python -m pytest -m 'not slow' -k 'mujoco4 or flex or geds' $(PYTEST_ARGS) \
-	  tests/hoses/mujoco/test_mujoco4.py tests/hoses/mujoco/test_flex.py tests/contracts
+# Under MuJoCo 4 dm-control does not load and the composite cable is gone: what is left has to run.
+smoke-mujoco4: $(NEXT)
+	$(NEXT_BIN)/python -m pytest -m 'not slow' tests/hoses/mujoco/test_mujoco4.py
+	PYTHONPATH=.:learning $(NEXT_BIN)/python tools/smoke.py
+
+test-mujoco4: smoke-mujoco4
+	$(NEXT_BIN)/python -m pytest -m 'not slow' -k 'flex or geds' $(PYTEST_ARGS) \
+	  tests/hoses/mujoco/test_flex.py tests/contracts
+
+test-matrix: | $(BIN)/python
+	nice $(BIN)/python tools/test_matrix.py $(MATRIX_ARGS)
 
 lint: $(DEV)
 	$(BIN)/ruff check .
@@ -59,12 +72,12 @@ clean:
 # A candidate counts only if it runs and is of a version we support: a name on the PATH may be a
 # launcher without an interpreter behind it. A virtual environment that fails half way is removed.
 $(BIN)/python:
-	@check='import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))'; \
-	for candidate in $(or $(PYTHON),python3.12 python3.11 python3 python); do \
+	@check='import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))'; \
+	for candidate in $(or $(PYTHON),python3.12 python3.11 python3.13 python3.14 python3 python); do \
 	  if "$$candidate" -c "$$check" >/dev/null 2>&1; then found=$$candidate; break; fi; \
 	done; \
 	if [ -z "$$found" ]; then \
-	  echo 'error: no Python 3.11 or 3.12 among: $(or $(PYTHON),python3.12 python3.11 python3 python)' >&2; \
+	  echo 'error: no Python 3.11 to 3.14 among: $(or $(PYTHON),python3.12 python3.11 python3.13 python3.14 python3 python)' >&2; \
 	  echo 'Install one of them, or name yours: make PYTHON=/path/to/python3.12' >&2; \
 	  exit 1; \
 	fi; \
@@ -76,11 +89,11 @@ $(BIN)/python:
 	}
 
 $(CORE): $(PINS) | $(BIN)/python
-	$(call install,.)
+	$(call install,.[all])
 	@touch $@
 
 $(DEV): $(PINS) | $(BIN)/python
-	$(call install,.[dev])
+	$(call install,.[all$(comma)dev])
 	@touch $(CORE) $@
 
 # The tested versions of all but MuJoCo; pytest finds the package in this folder.
@@ -90,7 +103,8 @@ $(NEXT): $(PINS) | $(BIN)/python
 	@grep -v '^mujoco==' constraints.txt > $(NEXT_VENV)/constraints.txt
 	@$(NEXT_BIN)/python -m pip install --quiet --disable-pip-version-check \
 	  --constraint $(NEXT_VENV)/constraints.txt \
-	  'mujoco>=4,<5' numpy scipy numba pytest pytest-timeout hypothesis
+	  'mujoco>=4,<5' numpy scipy numba tyro rich gymnasium pettingzoo dm-env pillow \
+	  pytest pytest-timeout hypothesis
 	@touch $@
 
 define install

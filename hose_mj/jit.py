@@ -13,7 +13,6 @@ import hashlib
 import importlib.util
 import re
 import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -22,7 +21,10 @@ from typing import Any
 
 import numba
 from numba import types
+from numba.core import event
 from numba.core.caching import IndexDataCacheFile
+from numba.core.compiler import Flags
+from numba.core.cpu import CPUTargetOptions
 from numba.extending import overload, register_jitable
 
 _OPTIONS: dict[str, Any] = {
@@ -32,6 +34,24 @@ _OPTIONS: dict[str, Any] = {
 }
 _INLINED: Any = {"error_model": "numpy", "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
+_MADE: set[Any] = set()
+"""What `_decorate` made, to tell ours from other people's."""
+
+
+def _keep_known(**options: bool) -> dict[str, bool]:
+    """The options that this version of numba knows; for one that is not public."""
+    known = {}
+    for name, value in options.items():
+        try:
+            CPUTargetOptions.parse_as_flags(Flags(), {name: value})  # type: ignore[no-untyped-call]
+        except Exception:  # whatever a later version raises, kernels compile without it
+            continue
+        known[name] = value
+    return known
+
+
+# No allocation inside, which is left out of numba's types: less to compile.
+_BARE = _keep_known(_nrt=False)
 
 
 @cache
@@ -133,6 +153,7 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
             stamp = own.locator.get_source_stamp()
             place = made._cache._cache_path
             made._cache._cache_file = _CacheFiles(place, name, stamp)
+        _MADE.add(made)
         return made
 
     return decorator
@@ -140,13 +161,12 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 compiled = _decorate()
 # For loops that must give, bit for bit, what their source gives as plain Python: no contractions.
-bitwise = _decorate(fastmath=False, _nrt=False)
-# _nrt=False (no allocation inside) is left out of numba's types.
-kernel = _decorate(_nrt=False)
+bitwise = _decorate(fastmath=False, **_BARE)
+kernel = _decorate(**_BARE)
 # Over all cores, with the arithmetic of its source; what it calls has its own options.
 parallel = _decorate(fastmath=False, parallel=True)
 # For small functions of a record with many fields, which a call would have to copy one by one.
-inlined = _decorate(_nrt=False, forceinline=True)
+inlined = _decorate(**_BARE, forceinline=True)
 # Put into its callers before they are compiled: no code of its own, which each caller of a long
 # function would optimize once more.
 merged = _decorate(inline="always")
@@ -184,28 +204,60 @@ def choose_by_unknowns(choices: Mapping[int, Any]) -> Any:
     return chosen
 
 
+class _Notice(event.Listener):
+    """Says on stderr that kernels are being compiled: once in a process, and only if any are.
+
+    numba tells of a compilation, not of what it loads from the disk. A stage is a kernel that is
+    called from Python, with all that goes into it; in a terminal the line counts them.
+    """
+
+    def __init__(self) -> None:
+        self.about = "kernels"
+        self.stages = self._depth = 0
+        self._is_shown = False
+
+    def on_start(self, told: Any) -> None:
+        """Counts a stage where it begins."""
+        self._depth += 1
+        if self._depth > 1 or told.data.get("dispatcher") not in _MADE:
+            return
+        self.stages += 1
+        live = sys.stderr.isatty()
+        if self.stages == 1 or live:
+            text = f"hose_mj: compiling the {self.about}, once on this machine"
+            text += f": stage {self.stages} ..." if live else " (some take half a minute) ..."
+            sys.stderr.write(f"\r{text}\x1b[K" if live else f"{text}\n")
+            sys.stderr.flush()
+            self._is_shown = live
+
+    def on_end(self, told: Any) -> None:
+        """Takes the line back where a terminal can."""
+        self._depth -= 1
+        if not self._depth and self._is_shown:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+            self._is_shown = False
+
+
+_NOTICE = _Notice()
+event.register("numba:compile", _NOTICE)  # type: ignore[no-untyped-call]
+
+
+def count_compiled() -> int:
+    """Returns how many kernels this process has compiled that were called from Python."""
+    return _NOTICE.stages
+
+
 @contextmanager
-def compile_notice(what: str) -> Iterator[None]:
-    """Says on stderr that kernels are being compiled when the block takes over a second."""
-    notice = f"hose_mj: compiling the {what} (once on this machine, under a minute) ...\n"
-    timer = threading.Timer(1.0, lambda: sys.stderr.write(notice))
-    timer.daemon = True
-    timer.start()
+def compile_notice(about: str) -> Iterator[None]:
+    """Names what the block compiles, if it does, for the notice on stderr."""
+    before, _NOTICE.about = _NOTICE.about, about
     try:
         yield
     finally:
-        timer.cancel()
-
-
-_called: set[tuple[Callable[..., Any], int]] = set()
+        _NOTICE.about = before
 
 
 def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
-    """Calls a kernel; a first call that takes over a second says on stderr that it compiles."""
-    version = (kernel, len(axes))
-    if version in _called:
-        return kernel(axes, *arguments)
-    with compile_notice("GEDS kernels"):
-        result = kernel(axes, *arguments)
-    _called.add(version)
-    return result
+    """Calls a kernel of a hose in a plane or in space."""
+    return kernel(axes, *arguments)

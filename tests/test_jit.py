@@ -1,5 +1,8 @@
+import os
+import shutil
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -36,3 +39,63 @@ def test_a_change_in_an_inlined_kernel_of_another_file_is_noticed(tmp_path, belo
     assert [answer for answer, _ in said] == ["20.0", "20.0", "30.0", "20.0"]
     # Both versions stay on the disk, so going back costs nothing.
     assert [("float64" in hits) for _, hits in said] == [False, True, False, True]
+
+
+def test_an_edit_of_any_kernel_file_renames_all_caches(tmp_path):
+    """Those of references too, which inline band.py from another folder."""
+    package = tmp_path / "hose_mj"
+    leave = shutil.ignore_patterns("__pycache__", "*.xml", "*.toml")
+    shutil.copytree(Path(jit.__file__).parent, package, ignore=leave)
+    before = jit._read_fingerprint(package)
+    with open(package / "hoses" / "geds" / "band.py", "a", encoding="utf-8") as file:
+        file.write("\n# an edit\n")
+    jit._read_fingerprint.cache_clear()
+    assert jit._read_fingerprint(package) != before
+
+
+@pytest.mark.parametrize("name", ["hose_mj.hoses.geds.band", "hose_mj.tasks.line.kernels"])
+def test_every_cache_is_named_after_the_fingerprint(name):
+    made = [value for value in vars(import_module(name)).values() if hasattr(value, "py_func")]
+    assert made
+    for kernel in made:
+        mark = jit._find_fingerprint(kernel.py_func)
+        assert mark in kernel._cache._cache_file._index_name
+
+
+def test_an_option_that_numba_does_not_know_is_left_out():
+    assert jit._keep_known(_no_such_option=False) == {}
+    assert jit._keep_known(boundscheck=False) == {"boundscheck": False}
+
+
+NOTICE = """
+from hose_mj.jit import compile_notice, count_compiled, kernel
+
+@kernel
+def first(x):
+    return x + 1.0
+
+@kernel
+def second(x):
+    return first(x) * 2.0
+
+with compile_notice("example"):
+    second(1.0)
+    first(1)
+print(count_compiled())
+"""
+
+
+def test_one_notice_and_only_if_something_is_compiled(tmp_path):
+    (tmp_path / "example.py").write_text(NOTICE)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    said = []
+    for _ in range(2):
+        command = [sys.executable, "-c", "import example"]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
+        said.append((int(done.stdout), done.stderr.splitlines()))
+    assert said[0][0] == 2
+    assert len(said[0][1]) == 1
+    assert said[0][1][0].startswith("hose_mj: compiling the example, once on this machine")
+    assert said[1] == (0, [])

@@ -33,7 +33,7 @@ class ThreadClock:
 
 def main() -> None:
     """Runs the cable and writes the file, a row a line."""
-    run.time = ThreadClock  # type: ignore[assignment]
+    vars(run)["time"] = ThreadClock
     cases = tuple(case for case in find_cases(()) if "cable" in case.models)
     study = run_study(
         cases, ("cable",), quick=True, seed=0, with_numerics=False, advance=lambda text: print(text)

@@ -1,6 +1,7 @@
 """Checks that this installation has what hose_mj needs, and says what to do where it has not.
 
-It fails only for what simulation and learning need; what the viewer needs is a warning.
+It fails only for what every installation needs; a missing extra, and what the viewer needs, is a
+warning.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ from hose_mj.recording.document import make_document, print_document
 
 VIEWER_PACKAGES = "mesa-vulkan-drivers libvulkan1"
 MUJOCO_REMEDY = (
-    'MuJoCo 4 has no composite cable and dm-control cannot load it; install "mujoco>=3.17,<4" '
-    '"dm-control==1.0.*"'
+    "MuJoCo 4 has no composite cable and dm-control cannot load it, the rest runs; for the cable: "
+    "pip install 'hose-mj[cable]'"
 )
+QUIET_EXTRAS = ("dev", "deep", "cluster", "all")
+"""Extras that nobody misses who does not ask for them."""
 CABLE_SCENE = """
 <mujoco>
   <extension><plugin plugin="mujoco.elasticity.cable"/></extension>
@@ -48,8 +51,6 @@ class Args:
 
     json: bool = False
     """Print one JSON document instead of the table."""
-    seed: int = 0
-    """Recorded in the document; nothing here is random."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Finding:
         limit: what is wanted.
         satisfied: whether the one satisfies the other.
         remedy: what to do if not.
-        required: True if nothing works without it, False if only the viewer suffers.
+        required: True if nothing works without it, False if only an optional part suffers.
     """
 
     name: str
@@ -110,8 +111,8 @@ def examine() -> Iterator[Finding]:
     """Yields the findings one after the other; each takes well under a second."""
     wanted_python, requirements = read_requirements()
     yield examine_python(wanted_python)
-    for requirement in requirements:
-        yield examine_dependency(requirement)
+    for requirement, extra in requirements.items():
+        yield examine_dependency(requirement, extra)
     yield examine_cable_plugin()
     yield examine_kernel_cache()
     yield examine_viewer()
@@ -119,40 +120,51 @@ def examine() -> Iterator[Finding]:
     yield examine_display()
 
 
-def read_requirements() -> tuple[SpecifierSet, list[Requirement]]:
-    """Returns the wanted Python and packages, from pyproject.toml in a checkout, else as installed.
+def read_requirements() -> tuple[SpecifierSet, dict[Requirement, str]]:
+    """Returns the wanted Python, and the extra ("" for none) that wants each package here.
 
-    Extras are left out: they are wanted by nothing that a plain installation offers.
+    From pyproject.toml in a checkout, else as installed.
     """
     project = Path(hose_mj.__file__).resolve().parent.parent / "pyproject.toml"
     if project.is_file():
         table = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
-        python, lines = table["requires-python"], table["dependencies"]
+        python = table["requires-python"]
+        extras = {"": table["dependencies"], **table["optional-dependencies"]}
+        lines = [(line, extra) for extra, group in extras.items() for line in group]
     else:
         metadata = importlib.metadata.metadata("hose-mj")
-        python, lines = metadata["Requires-Python"], metadata.get_all("Requires-Dist") or []
-    requirements = [Requirement(line) for line in lines]
-    return SpecifierSet(python), [
-        r for r in requirements if r.marker is None or r.marker.evaluate({"extra": ""})
-    ]
+        python, names = metadata["Requires-Python"], metadata.get_all("Provides-Extra") or []
+        every = metadata.get_all("Requires-Dist") or []
+        lines = [(line, extra) for extra in ("", *names) for line in every]
+    wanted: dict[Requirement, str] = {}
+    for line, extra in lines:
+        requirement = Requirement(line)
+        is_wanted = requirement.marker is None or requirement.marker.evaluate({"extra": extra})
+        if is_wanted and extra not in QUIET_EXTRAS:
+            wanted.setdefault(requirement, extra)
+    return SpecifierSet(python), wanted
 
 
 def examine_python(wanted: SpecifierSet) -> Finding:
     """Holds the running Python against the wanted one."""
     version = platform.python_version()
-    remedy = "make the virtual environment again: make clean, then make demo PYTHON=python3.12"
+    remedy = "make the virtual environment again, with a later Python (make demo PYTHON=python3.12)"
     return Finding("python", version, str(wanted), wanted.contains(version, True), remedy)
 
 
-def examine_dependency(requirement: Requirement) -> Finding:
-    """Holds the installed version of a package against the wanted range."""
+def examine_dependency(requirement: Requirement, extra: str = "") -> Finding:
+    """Holds the installed version of a package against the wanted range; only warns of an extra."""
     name, wanted = requirement.name, requirement.specifier
-    remedy = MUJOCO_REMEDY if name == "mujoco" else f'pip install "{requirement}"'
+    remedy = f"pip install 'hose-mj[{extra}]'" if extra else f'pip install "{requirement}"'
+    shown = f"{name} (extra {extra})" if extra and name == "mujoco" else name
+    if extra and name == "mujoco":
+        remedy = MUJOCO_REMEDY
     try:
         version = importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
-        return Finding(name, "not installed", str(wanted), False, remedy)
-    return Finding(name, version, str(wanted), wanted.contains(version, prereleases=True), remedy)
+        return Finding(shown, "not installed", str(wanted), False, remedy, not extra)
+    fits = wanted.contains(version, prereleases=True)
+    return Finding(shown, version, str(wanted), fits, remedy, not extra)
 
 
 def examine_cable_plugin() -> Finding:
@@ -163,8 +175,9 @@ def examine_cable_plugin() -> Finding:
 
         model = mujoco.MjModel.from_xml_string(CABLE_SCENE)
     except Exception as error:  # whatever stops it (an import, a parser) is the finding
-        return Finding(name, describe(error), wanted, False, MUJOCO_REMEDY)
-    return Finding(name, f"{model.nplugin} plugin", wanted, model.nplugin == 1, "reinstall mujoco")
+        return Finding(name, describe(error), wanted, False, MUJOCO_REMEDY, False)
+    fits = model.nplugin == 1
+    return Finding(name, f"{model.nplugin} plugin", wanted, fits, "reinstall mujoco", False)
 
 
 def examine_kernel_cache() -> Finding:
@@ -184,7 +197,7 @@ def examine_viewer() -> Finding:
     """Looks for the Rerun viewer's program, which comes with rerun-sdk."""
     places = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", "")])
     found = shutil.which("rerun", path=places)
-    remedy = "pip install --force-reinstall rerun-sdk"
+    remedy = "pip install 'hose-mj[viewer]'"
     wanted = "the program rerun"
     return Finding("viewer", found or "not found", wanted, found is not None, remedy, False)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import sys
 import time
@@ -11,7 +12,6 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from hose_mj.cli.display import check_display
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
@@ -46,8 +46,6 @@ class Args:
     """The hose's model: geds, cable or flex."""
     json: bool = False
     """Print one JSON document on stdout when the window is closed; messages go to stderr."""
-    seed: int = 0
-    """Without effect: nothing is left to chance."""
 
 
 class Desk:
@@ -108,6 +106,19 @@ class Desk:
         if robot < self.world.n_robots:
             self.robot = robot
             self._tell(f"robot {robot}: {self.world.scene.robots[robot].name}")
+
+
+def check_display(what: str) -> None:
+    """Raises `InputError` where a window cannot be opened.
+
+    Args:
+        what: needs the window.
+    """
+    if sys.platform == "linux" and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        valid = "a display (DISPLAY or WAYLAND_DISPLAY); without one, hose-mj rollout --save F.rrd"
+        raise InputError(f"display for {what}", None, valid)
 
 
 def run(args: Args) -> int:

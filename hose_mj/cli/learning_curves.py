@@ -69,8 +69,8 @@ class Args(train.LearnerArgs):
     """Trainings of each learner."""
     title: str | None = None
     """Above the picture; by default the task and its options."""
-    out: Path = Path("out/curves.png")
-    """The picture."""
+    save: Path = Path("out/curves.png")
+    """The picture (PNG)."""
     json: bool = False
     """Print one JSON document on stdout; messages go to stderr."""
     seed: int = 0
@@ -89,9 +89,9 @@ def run(args: Args) -> int:
     x = np.arange(1, args.bins + 1, dtype=np.float64) * (args.episodes / args.bins)
     panels = [make_panel(name, x, measured) for name in args.measures]
     title = args.title or ", ".join([args.task, *args.set])
-    write_atomically(args.out, plot_learning(title, "episodes", panels))
+    write_atomically(args.save, plot_learning(title, "episodes", panels))
     results: dict[str, Any] = {
-        "picture": str(args.out),
+        "picture": str(args.save),
         "curves": list_records(args.measures, panels),
     }
     if args.json:
@@ -100,7 +100,7 @@ def run(args: Args) -> int:
         for record in results["curves"]:
             last = "nothing" if record["mean"][-1] is None else f"{record['mean'][-1]:.3g}"
             print(f"{record['learner']}: {record['measure']} {last} in the last bin")
-        print(f"picture: {args.out}")
+        print(f"picture: {args.save}")
     return 0
 
 

@@ -2,69 +2,32 @@
 
 from __future__ import annotations
 
-import argparse
+import errno
 import importlib
+import io
+import os
+import re
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from contextlib import ExitStack, nullcontext, redirect_stderr, redirect_stdout, suppress
+from typing import Any, Protocol, TextIO, cast
 
 import hose_mj
+from hose_mj.cli.commands import COMMANDS, GROUPS, Command
 from hose_mj.errors import HoseError, InputError
+from hose_mj.extras import MissingExtra, find_extra, require
 
-DONE, CHECK_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-"""Exit statuses; 130 is what a shell expects of a program stopped with Ctrl-C."""
+DONE, CHECK_FAILED, BAD_INPUT, REFUSED, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
+"""Exit statuses; the last two are what a shell expects after Ctrl-C and of a closed pipe."""
 
+ENDING = """Every command takes --json (one JSON document on stdout, messages on stderr) and --quiet
+(no messages and no progress); those that leave something to chance take --seed.
 
-@dataclass(frozen=True)
-class Command:
-    """Where a sub-command lives, and the line about it in `hose-mj --help`."""
-
-    module: str
-    summary: str
-
-
-COMMANDS = {
-    "bench": Command("hose_mj.cli.bench.command", "measure speed beside peers that people know"),
-    "check-breaks": Command(
-        "hose_mj.cli.check_breaks", "check that hose models break alike under the same moves"
-    ),
-    "check-pcm": Command(
-        "hose_mj.cli.check_pcm", "check that one task is a partially constrained model of another"
-    ),
-    "check-sequential": Command(
-        "hose_mj.cli.check_sequential", "check that moves in turn are joint moves of one agent"
-    ),
-    "classifiers": Command(
-        "hose_mj.cli.classifiers", "measure which classifiers predict undesired moves (chapter 8)"
-    ),
-    "compare": Command(
-        "hose_mj.cli.compare", "measure the hose models against closed forms, or on your own hose"
-    ),
-    "consensus": Command(
-        "hose_mj.cli.consensus", "let agents agree on whose turn it is, by messages"
-    ),
-    "curves": Command("hose_mj.cli.learning_curves", "draw how learners get better as they train"),
-    "doctor": Command("hose_mj.cli.doctor", "check that this installation has what hose_mj needs"),
-    "drive": Command("hose_mj.cli.drive", "drive the robots of a scene with the keyboard"),
-    "joint-policy": Command(
-        "hose_mj.cli.joint_policy", "compose what agents learned in turns into joint moves"
-    ),
-    "relevance": Command(
-        "hose_mj.cli.relevance", "find the state variables that matter for each constraint"
-    ),
-    "reproduce": Command(
-        "hose_mj.cli.reproduce", "repeat the thesis's experiments over seeds, beside its numbers"
-    ),
-    "rollout": Command("hose_mj.cli.rollout", "run an episode of a policy in a scene with a hose"),
-    "train": Command(
-        "hose_mj.cli.train", "train a learner on a task, test it and keep what it learned"
-    ),
-    "transfer": Command(
-        "hose_mj.cli.transfer", "start on a task from what was learned on a simpler one"
-    ),
-    "view": Command("hose_mj.cli.view", "open a recording at the moment of the break"),
-}
+Exit status: 0 done, 1 a check failed, 2 bad input, 3 the machine refused (disk, permission,
+memory).
+"""
 
 
 class CommandModule(Protocol):
@@ -86,19 +49,105 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: the words after the program's name; those of this process by default.
 
     Returns:
-        0 done, 1 a check failed, 2 bad input, 130 interrupted.
+        0 done, 1 a check failed, 2 bad input, 3 the machine refused, 130 interrupted, 141 nobody
+        reads the output any more.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    if sys.stdout is None or sys.stderr is None:  # closed by whoever started this
+        sys.stdout, sys.stderr = sys.stdout or _open_nothing(), sys.stderr or _open_nothing()
+    status = _run_reporting(words)
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _drop_output()
+        return PIPE_CLOSED
+    except OSError as error:
+        _drop_output()
+        _complain(f"cannot write to stdout: {error.strerror}")
+        return BAD_INPUT
+    return status
+
+
+def _run_reporting(words: list[str]) -> int:
+    """Runs a command line; what stops it becomes one line on stderr and a status."""
     try:
         return run_command(words)
     except HoseError as error:
-        print(f"hose-mj: error: {error}", file=sys.stderr)
+        _complain(f"{error}{_suggest(error)}")
         return BAD_INPUT
+    except ModuleNotFoundError as error:
+        extra = find_extra(error.name or "")
+        if extra is None:
+            raise
+        _complain(str(MissingExtra(extra, f"this (the module {error.name})")))
+        return BAD_INPUT
+    except BrokenPipeError:
+        _drop_output()
+        return PIPE_CLOSED
+    except OSError as error:
+        if error.errno is None and error.strerror is None and not isinstance(error, TimeoutError):
+            raise  # not the operating system's: a bug
+        _complain(_describe_refusal(error))
+        full = error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF)
+        return BAD_INPUT if full and not _can_print() else REFUSED
+    except MemoryError as error:
+        _complain(f"not enough memory{f': {error}' if str(error) else ''}")
+        return REFUSED
     except KeyboardInterrupt:
         print("hose-mj: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except SystemExit as stop:  # how argparse and tyro end after --help or a wrong argument
+    except SystemExit as stop:  # how tyro ends after --help or a wrong argument
+        if isinstance(stop.__context__, BrokenPipeError):  # and rich where nobody reads on
+            _drop_output()
+            return PIPE_CLOSED
         return stop.code if isinstance(stop.code, int) else DONE
+
+
+def _complain(text: str) -> None:
+    with suppress(OSError):  # nowhere to say it: the status is all there is
+        print(f"hose-mj: error: {text}", file=sys.stderr)
+
+
+def _describe_refusal(error: OSError) -> str:
+    """The system's reason, with the file that it is about if it says so; one line."""
+    names = [str(name) for name in (error.filename, error.filename2) if name is not None]
+    reason = error.strerror or str(error)
+    return " ".join(f"{', '.join(names)}{': ' * bool(names)}{reason}".split())
+
+
+def _can_print() -> bool:
+    """Says whether stdout takes what is written: where it goes is part of the command line."""
+    try:
+        print(flush=True)
+    except OSError:
+        _drop_output()
+        return False
+    return True
+
+
+def _suggest(error: HoseError) -> str:
+    """What a misspelt word may have meant, out of those that the error calls valid."""
+    if not isinstance(error, InputError) or not isinstance(error.value, str):
+        return ""
+    import difflib
+
+    known = re.findall(r"[\w.-]+", error.valid)
+    near = difflib.get_close_matches(error.value, known, n=1, cutoff=0.7)
+    return f" (did you mean {near[0]}?)" if near and near[0] != error.value else ""
+
+
+def _open_nothing() -> TextIO:
+    return open(os.devnull, "w", encoding="utf-8")
+
+
+def _drop_output() -> None:
+    """Sends what is still to be written nowhere, so that Python's own flush at the end is quiet."""
+    try:
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, sys.stdout.fileno())
+        os.close(nothing)
+    except (OSError, ValueError):  # no file behind it, as in tests
+        pass
 
 
 def run_command(words: Sequence[str]) -> int:
@@ -106,47 +155,118 @@ def run_command(words: Sequence[str]) -> int:
 
     Raises:
         InputError: there is no such sub-command.
-        SystemExit: after --help, --version or arguments that do not parse.
+        SystemExit: after --help or arguments that do not parse.
     """
-    parser = make_parser()
-    name = parser.parse_args(words[:1]).command
-    if name is None:
-        parser.print_help(sys.stderr)
-        return BAD_INPUT
+    name = words[0] if words else None
+    if name in (None, "-h", "--help"):
+        print(make_help(), file=sys.stdout if words else sys.stderr, end="")
+        return DONE if words else BAD_INPUT
+    if name == "--version":
+        print(f"hose-mj {hose_mj.__version__}")
+        return DONE
     if name not in COMMANDS:
-        raise InputError("command", name, f"{', '.join(COMMANDS)} (see hose-mj --help)")
-    module = cast(CommandModule, importlib.import_module(COMMANDS[name].module))
-    return module.run(parse_arguments(name, module.Args, words[1:]))
+        what = "option" if name.startswith("-") else "command"
+        known = "--help, --version" if what == "option" else ", ".join(COMMANDS)
+        raise InputError(what, name, known)
+    command = COMMANDS[name]
+    rest = rename_options(name, command, words[1:])
+    quiet = "--quiet" in rest
+    rest = [word for word in rest if word != "--quiet"]
+    module = cast(CommandModule, importlib.import_module(command.module))
+    args = parse_arguments(name, module.Args, rest)
+    for extra in command.needs:
+        require(extra, f"hose-mj {name}")
+    with ExitStack() as stack:
+        if quiet:
+            stack.enter_context(redirect_stderr(stack.enter_context(_open_nothing())))
+        return module.run(args)
+
+
+def rename_options(name: str, command: Command, words: Sequence[str]) -> list[str]:
+    """Returns the words with old spellings of options replaced; says so on stderr.
+
+    The values of one option that stood under several spellings are put together.
+    """
+    parts: list[list[str]] = [[]]
+    for word in words:
+        key, equals, value = word.partition("=")
+        if key.startswith("--"):
+            parts.append([key, value] if equals else [key])
+        else:
+            parts[-1].append(word)
+    kept: list[list[str]] = []
+    for part in parts:
+        rule = command.renamed.get(part[0]) if part else None
+        if rule is None or (rule.several and len(part) < 3):
+            kept.append(part)
+            continue
+        said = "has no effect" if rule.new is None else f"is now {rule.new}"
+        print(f"hose-mj {name}: {part[0]} {said}", file=sys.stderr)
+        if rule.new is None:
+            kept.append(part[2:])  # without its value
+            continue
+        values = [rule.prefix + value for value in part[1:]]
+        same = next((other for other in kept if other[:1] == [rule.new]), None)
+        if same is None:
+            kept.append([rule.new, *values])
+        else:
+            same += values
+    return [word for part in kept for word in part]
 
 
 def parse_arguments(name: str, arguments: type[Any], words: Sequence[str]) -> Any:
     """Returns the `Args` of a sub-command that its words describe."""
     import tyro
 
-    return tyro.cli(
-        arguments,
-        prog=f"hose-mj {name}",
-        args=list(words),
-        config=(tyro.conf.FlagCreatePairsOff,),
-    )
+    asks = bool({"-h", "--help"} & set(words))
+    shown = io.TextIOWrapper(io.BytesIO(), getattr(sys.stdout, "encoding", None) or "utf-8")
+    try:
+        with redirect_stdout(shown) if asks else nullcontext():
+            return tyro.cli(
+                arguments,
+                prog=f"hose-mj {name}",
+                args=list(words),
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
+            )
+    except SystemExit:
+        if asks:
+            shown.seek(0)
+            print(_finish_help(name, shown.read()), end="")
+        raise
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """Returns the parser of the first word; what follows belongs to the sub-command."""
-    width = max(map(len, COMMANDS))
-    commands = "\n".join(f"  {name:{width}}  {c.summary}" for name, c in COMMANDS.items())
-    parser = argparse.ArgumentParser(
-        prog="hose-mj",
-        usage="hose-mj COMMAND [ARGUMENTS]\n       hose-mj COMMAND --help",
-        description=f"{hose_mj.__doc__.splitlines()[0] if hose_mj.__doc__ else ''}\n\n"
-        f"commands:\n{commands}",
-        epilog="Every command takes --json (one JSON document on stdout, messages on stderr) and\n"
-        "--seed. Exit status: 0 done, 1 a check failed, 2 bad input.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("command", nargs="?", metavar="COMMAND", help=argparse.SUPPRESS)
-    parser.add_argument("--version", action="version", version=f"hose-mj {hose_mj.__version__}")
-    return parser
+def _finish_help(name: str, text: str) -> str:
+    """The help of a sub-command, wrapped, with examples, without defaults that say nothing."""
+    empty = re.compile(r"\(default: (None|False|)\)")
+    lines = [empty.sub(lambda found: " " * len(found.group()), line) for line in text.splitlines()]
+    lines = [line if line[:1] in "│╭╰|+" else _wrap(line) for line in lines]
+    examples = COMMANDS[name].examples if name in COMMANDS else ()
+    lines += ["", "examples:", *(f"  {line}" for line in examples), ""] if examples else []
+    return "\n".join([*lines, _wrap(ENDING), ""])
+
+
+def _wrap(text: str) -> str:
+    """Returns paragraphs that fit into the terminal."""
+    width = min(100, max(40, shutil.get_terminal_size().columns))
+    return "\n\n".join(textwrap.fill(" ".join(one.split()), width) for one in text.split("\n\n"))
+
+
+def make_help() -> str:
+    """Returns the help of the program: the commands, by what they are for."""
+    indent = 4 + max(map(len, COMMANDS))
+    width = min(100, max(50, shutil.get_terminal_size().columns))
+    about = (hose_mj.__doc__ or "").splitlines()[0]
+    lines = ["usage: hose-mj COMMAND [ARGUMENTS]", "       hose-mj COMMAND --help", ""]
+    lines += [*textwrap.wrap(about, width), "", "commands:"]
+    for group, commands in GROUPS.items():
+        lines += ["", group]
+        for name, command in commands.items():
+            head = f"  {name}".ljust(indent)
+            after = " " * indent
+            lines += textwrap.wrap(
+                command.summary, width, initial_indent=head, subsequent_indent=after
+            )
+    return "\n".join([*lines, "", _wrap(ENDING), ""])
 
 
 if __name__ == "__main__":

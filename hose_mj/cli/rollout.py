@@ -6,20 +6,26 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import Annotated, Any
 
 import numpy as np
 import tyro
 
-from hose_mj.cli.rollout_recording import Recording
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
+from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
+from hose_mj.recording.sinks import Sink
+from hose_mj.rollout.capture import Capture
 from hose_mj.rollout.episode import EpisodeResult, Observer, Policy, run_episode
 from hose_mj.rollout.policies import POLICIES, make_policy
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.registry import WORLDS, make_world
 from hose_mj.world.world import World
+
+ENDINGS = {"save": ".rrd", "mp4": ".mp4", "csv": ".csv"}
+EXTRAS_OF_ENDINGS = {"save": "viewer", "mp4": "video", "csv": "pyarrow"}
 
 
 @dataclass(frozen=True)
@@ -32,8 +38,10 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional]
     """A shipped scene (floor_1 to floor_6, corridor, deck, lift), or your own MJCF file."""
-    model: tuple[str, ...] = ("geds",)
-    """The hose's model: geds, cable or flex; of two, both episodes run and are shown overlaid."""
+    model: str = "geds"
+    """The hose's model: geds, cable or flex."""
+    models: tuple[str, ...] = ()
+    """Two models instead of one: both episodes run and are shown overlaid."""
     policy: str = "to-goal"
     """random, to-goal, break-stretch, break-run-over, break-collision, break-obstacle,
     break-bounds, or the run folder of a learner (hose-mj train line)."""
@@ -130,12 +138,99 @@ class _Timed:
             observer.finish(outcome)
 
 
+class Recording:
+    """Records the episodes of one command; a context that ends what is open.
+
+    A single episode goes to its .rrd and to a live viewer while it runs; films, tables and two
+    episodes overlaid are written when all have ended.
+
+    Args:
+        wishes: what is to be recorded.
+        scene: in which the episodes are.
+        n_episodes: how many there will be.
+
+    Raises:
+        InputError: a file whose name does not end as it should or whose folder is not there, or a
+            film, a table or a live view of two episodes.
+        MissingExtra: what writes one of these is not installed.
+    """
+
+    def __init__(self, wishes: Args, scene: Scene, n_episodes: int) -> None:
+        self._wishes, self._scene, self._overlays = wishes, scene, n_episodes > 1
+        self._captures: list[Capture] = []
+        for name, ending in ENDINGS.items():
+            path = getattr(wishes, name)
+            if path is None:
+                continue
+            if path.suffix != ending:
+                raise InputError(name, str(path), f"a file name that ends in {ending}")
+            if not path.resolve().parent.is_dir():
+                raise InputError(name, str(path), "a file in a folder that is there")
+            require(EXTRAS_OF_ENDINGS[name], f"--{name}")
+        if wishes.spawn or wishes.connect:
+            require("viewer", "a live viewer")
+        if self._overlays and (wishes.spawn or wishes.connect or wishes.mp4 or wishes.csv):
+            raise InputError("number of models", n_episodes, "1, or --save alone")
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for capture in self._captures:
+            capture.finish()
+        if kind is None and self._captures:
+            self._write()
+
+    def make_observers(self) -> list[Observer]:
+        """What is to watch the next episode; nothing where nothing is recorded."""
+        wishes = self._wishes
+        sinks = [] if self._overlays else self._open_sinks()
+        keeps = bool(wishes.mp4 or wishes.csv or (self._overlays and wishes.save))
+        captures = [Capture(sinks, keep=keeps)] if sinks or keeps else []
+        self._captures += captures
+        return list(captures)
+
+    def describe(self) -> list[str]:
+        """A line for each file."""
+        paths = {name: getattr(self._wishes, name) for name in ENDINGS}
+        return [f"{name}: {path}" for name, path in paths.items() if path is not None]
+
+    def _open_sinks(self) -> list[Sink]:
+        wishes = self._wishes
+        if not (wishes.save or wishes.connect or wishes.spawn):
+            return []
+        from hose_mj.recording.rerun.episodes import open_sinks
+
+        return open_sinks(wishes.save, wishes.connect, wishes.spawn)
+
+    def _write(self) -> None:
+        """Writes what needs whole episodes."""
+        wishes = self._wishes
+        if self._overlays and wishes.save is not None:
+            from hose_mj.recording.rerun.episodes import write_world_recording
+
+            write_world_recording(wishes.save, [one.episode() for one in self._captures])
+        if wishes.csv is not None:
+            from hose_mj.recording.world_table import write_csv
+
+            write_csv(wishes.csv, self._captures[0].episode())
+        if wishes.mp4 is not None:
+            from hose_mj.rollout.video import write_mp4
+
+            write_mp4(wishes.mp4, self._captures[0].episode(), self._scene)
+
+
 def run(args: Args) -> int:
     """Runs the episodes; 0 when done."""
-    _check(args)
+    models = _check(args)
     scene = read_scene(find_scene(args.scene))
-    with Recording(args, scene, len(args.model)) as recording:
-        rollouts = [_roll_out(args, scene, model, recording) for model in args.model]
+    with Recording(args, scene, len(models)) as recording:
+        rollouts = [_roll_out(args, scene, model, recording) for model in models]
     records = [rollout.to_record(args) for rollout in rollouts]
     if args.json:
         results = {**records[0], "rollouts": records}
@@ -146,15 +241,18 @@ def run(args: Args) -> int:
     return 0
 
 
-def _check(args: Args) -> None:
-    models = set(args.model)
-    if not 1 <= len(args.model) <= 2 or len(models) != len(args.model) or models - set(WORLDS):
-        valid = f"one or two different ones of {', '.join(WORLDS)}"
-        raise InputError("model", " ".join(args.model), valid)
+def _check(args: Args) -> tuple[str, ...]:
+    """Returns the models to run; raises `InputError` for a value outside its valid set."""
+    if args.models and (len(args.models) != 2 or len(set(args.models) & set(WORLDS)) != 2):
+        valid = f"two different ones of {', '.join(WORLDS)}"
+        raise InputError("models", " ".join(args.models), valid)
+    if args.model not in WORLDS:
+        raise InputError("model", args.model, f"one of {', '.join(WORLDS)}")
     if args.seed < 0:
         raise InputError("seed", args.seed, "a whole number, at least 0")
     if not 0.0 < args.duration <= 3600.0:
         raise InputError("duration", args.duration, "above 0, at most 3600 (s)")
+    return args.models or (args.model,)
 
 
 def _make_policy(name: str) -> Policy:

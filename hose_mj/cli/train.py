@@ -7,14 +7,13 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import tyro
 from hose_learning.learners import catalog
 from hose_learning.presets import VALUES, VETOES
 from hose_learning.settings import Exploration
-from hose_learning.study.run_folder import RunFolder
 from hose_learning.study.statistics import compute_rate_interval
 from hose_learning.study.training import Episodes, Training, join
 
@@ -25,6 +24,9 @@ from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.tasks.registry import TASKS, make_task
 from hose_mj.tasks.task import Task
+
+if TYPE_CHECKING:
+    from hose_learning.study.run_folder import RunFolder
 
 DEFAULT_EPISODES = {"line": 100_000, "line-non-cooperative": 100_000, "line-2015": 20_000}
 """Where the default of 2,000 episodes is too few."""
@@ -140,6 +142,8 @@ def make_training(args: Args) -> Training:
 
 
 def _begin(args: Args) -> tuple[RunFolder, Training, int, Args]:
+    from hose_learning.study.run_folder import RunFolder
+
     training = make_training(args)
     name = f"{training.task.id}-{training.learner_id}-seed{args.seed}"
     folder = RunFolder(args.out or find_free(Path("out") / "train" / name))
@@ -156,6 +160,8 @@ def find_free(path: Path) -> Path:
 
 def _resume(args: Args) -> tuple[RunFolder, Training, int, Args]:
     """Opens a run that goes on to where it was to end, or to where it is told to now."""
+    from hose_learning.study.run_folder import RunFolder
+
     assert args.resume is not None
     folder = RunFolder(args.resume)
     training, seed = folder.open()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from hose_mj.cli.check_table import print_checks
-from hose_mj.cli.task_options import parse_options
+from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
@@ -31,10 +31,8 @@ class Args:
     """Id of the task to learn on first."""
     target: Annotated[str, tyro.conf.Positional]
     """Id of the task that it is for."""
-    source_set: tuple[str, ...] = ()
-    """Options of the source, as collision=robots."""
-    target_set: tuple[str, ...] = ()
-    """Options of the target."""
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    """Options of both tasks, or of one: source.NAME=VALUE, target.NAME=VALUE."""
     moves: int = 300_000
     """Moves of single agents on the source."""
     episodes: int = 3
@@ -93,11 +91,12 @@ def _run_all(args: Args) -> list[TransferOutcome]:
     from hose_mj.cli.progress import show_progress
     from hose_mj.jit import compile_notice
 
+    options = read_options(args.set, ("source", "target"))
     plan = TransferPlan(
         source=args.source,
         target=args.target,
-        source_options=parse_options(args.source_set),
-        target_options=parse_options(args.target_set),
+        source_options=options[""] | options["source"],
+        target_options=options[""] | options["target"],
         moves=args.moves,
         episodes=args.episodes,
         exchange=args.exchange,

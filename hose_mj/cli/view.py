@@ -24,8 +24,6 @@ class Args:
     """Simulated time to show (s); by default that of the break, else the last sample."""
     json: bool = False
     """Print one JSON document about the recording."""
-    seed: int = 0
-    """Recorded in the document; nothing here is random."""
 
 
 def run(args: Args) -> int:

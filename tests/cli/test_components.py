@@ -95,8 +95,16 @@ def test_an_untrained_joint_policy_fails_its_check(capsys, uncompiled):
 
 
 def test_transfer(capsys, uncompiled):
-    words = ("transfer", "line", "line", "--target-set", *SMALL, "--source-set", *SMALL)
-    words += ("collision=robots", "--moves", "1500", "--configurations", "2", "--exchange", "1e6")
+    words = ("transfer", "line", "line", "--set", *SMALL)
+    words += (
+        "source.collision=robots",
+        "--moves",
+        "1500",
+        "--configurations",
+        "2",
+        "--exchange",
+        "1e6",
+    )
     status, out, err = run(capsys, *words, "--json")
     document = json.loads(out)
     assert status == 0

@@ -19,7 +19,7 @@ FEW = ("--episodes", "40", "--bins", "4", "--seeds", "2")
 def test_it_draws_a_picture_and_prints_the_numbers_in_it(tmp_path, capsys):
     out = tmp_path / "new" / "curves.png"
     words = ["curves", "maze", "--learners", "q-learning", "safe-msav", *FEW]
-    assert main([*words, "--measures", "success", "moves", "--out", str(out), "--json"]) == 0
+    assert main([*words, "--measures", "success", "moves", "--save", str(out), "--json"]) == 0
     assert out.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
     document = json.loads(capsys.readouterr().out)
     assert document["command"] == "curves"
@@ -107,7 +107,7 @@ def test_options_are_for_all_learners_or_for_the_one_they_name(monkeypatch):
     ],
 )
 def test_a_mistake_is_one_line(words, named, capsys, tmp_path):
-    assert main(["curves", "maze", "--out", str(tmp_path / "a.png"), *words]) == 2
+    assert main(["curves", "maze", "--save", str(tmp_path / "a.png"), *words]) == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("hose-mj: error")
     assert named in error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import shlex
 import subprocess
 import sys
 import types
@@ -48,7 +50,9 @@ def test_help_lists_every_command_with_its_summary(capsys):
     out = capsys.readouterr().out
     for name, command in cli.COMMANDS.items():
         assert f"  {name} " in out
-        assert command.summary in out
+        assert command.summary in " ".join(out.split())
+    for group in cli.GROUPS:
+        assert f"\n{group}\n" in out
 
 
 def test_version(capsys):
@@ -125,21 +129,144 @@ def test_interrupt(fake_command, capsys):
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)
-def test_every_command_takes_json_and_seed(name):
-    pytest.importorskip(cli.COMMANDS[name].module, exc_type=ModuleNotFoundError)
+def test_every_command_takes_json_and_its_help_reads_well(name, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
     module = import_module(cli.COMMANDS[name].module)
     hints = get_type_hints(module.Args)
     assert hints["json"] is bool
-    assert "seed" in hints
+    assert hints.get("seed", int) is int
     assert module.Args.__dataclass_params__.frozen
-    with pytest.raises(SystemExit) as stop:
-        cli.parse_arguments(name, module.Args, ["--help"])
-    assert stop.value.code == 0
+    assert cli.main([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "{None}" not in out
+    assert "without effect" not in out
+    assert max(map(len, out.partition("examples:")[0].splitlines())) <= 80
+    for line in cli.COMMANDS[name].examples:
+        assert f"  {line}\n" in out
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_has_an_example_that_parses(name):
+    assert cli.COMMANDS[name].examples
+    for line in cli.COMMANDS[name].examples:
+        words = shlex.split(line.removeprefix('eval "$(').removesuffix(')"'))
+        assert words[:2] == ["hose-mj", name]
+        arguments = import_module(cli.COMMANDS[name].module).Args
+        assert isinstance(cli.parse_arguments(name, arguments, words[2:]), arguments)
+
+
+def test_a_misspelt_command_or_name_is_corrected(fake_command, capsys):
+    assert cli.main(["trian"]) == 2
+    assert "(did you mean train?)" in capsys.readouterr().err
+    fake_command.run = raising(InputError("scene", "flor_2", "one of floor_1, floor_2"))
+    assert cli.main(["fake"]) == 2
+    assert capsys.readouterr().err.endswith("(did you mean floor_2?)\n")
+
+
+def test_a_misspelt_option_is_corrected(fake_command, capsys):
+    assert cli.main(["fake", "--conut", "3"]) == 2
+    assert "--count" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "a.rrd"), "a.rrd: No space left"),
+        (PermissionError(errno.EACCES, "Permission denied", "/x"), "/x: Permission denied"),
+        (OSError(errno.EROFS, "Read-only file system"), "Read-only file system"),
+        (NotADirectoryError(errno.ENOTDIR, "Not a directory", "plain/b"), "plain/b: Not a dir"),
+        (MemoryError("Unable to allocate 8 EiB"), "not enough memory: Unable to allocate"),
+        (MemoryError(), "not enough memory"),
+    ],
+)
+def test_a_machine_that_refuses_is_one_line_and_status_3(fake_command, capsys, error, said):
+    fake_command.run = raising(error)
+    assert cli.main(["fake"]) == 3
+    err = capsys.readouterr().err
+    assert err.startswith(f"hose-mj: error: {said}")
+    assert err.count("\n") == 1
+
+
+def test_a_missing_extra_is_said_before_any_work(fake_command, capsys, monkeypatch):
+    done = []
+    fake_command.run = lambda args: done.append(args) or 0
+    wanting = cli.Command("tools.fake", "does something", needs=("viewer",))
+    monkeypatch.setitem(cli.COMMANDS, "fake", wanting)
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert cli.main(["fake"]) == 2
+    assert not done
+    line = "hose-mj fake needs the extra `viewer`: pip install 'hose-mj[viewer]'"
+    assert capsys.readouterr().err == f"hose-mj: error: {line}\n"
+
+
+def test_a_module_of_an_extra_that_is_imported_late(fake_command, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+
+    def run(args):
+        import pyarrow.parquet  # noqa: F401
+
+    fake_command.run = run
+    assert cli.main(["fake"]) == 2
+    assert "pip install 'hose-mj[report]'" in capsys.readouterr().err
+
+
+def test_quiet_leaves_results_and_errors(fake_command, capsys):
+    def run(args):
+        sys.stderr.write("progress\n")
+        sys.stdout.write("result\n")
+        raise StepError("step 3 diverged")
+
+    fake_command.run = run
+    assert cli.main(["fake", "--quiet"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "result\n"
+    assert captured.err == "hose-mj: error: step 3 diverged\n"
+
+
+def test_old_spellings_of_options_work_on(capsys):
+    rename = cli.rename_options
+    old = ["line", "--source-set", "a=1", "b=2", "--moves", "5", "--target-set=c=3"]
+    new = ["line", "--set", "source.a=1", "source.b=2", "target.c=3", "--moves", "5"]
+    assert rename("transfer", cli.COMMANDS["transfer"], old) == new
+    assert "--source-set is now --set" in capsys.readouterr().err
+    old = ["view", "--seed", "3", "a.rrd"]
+    assert rename("view", cli.COMMANDS["view"], old) == ["view", "a.rrd"]
+    assert "--seed has no effect" in capsys.readouterr().err
+    old = ["floor_1", "--model", "geds", "cable"]
+    found = rename("rollout", cli.COMMANDS["rollout"], old)
+    assert found == ["floor_1", "--models", "geds", "cable"]
+    same = ["floor_1", "--model", "geds"]
+    assert rename("rollout", cli.COMMANDS["rollout"], same) == same
+
+
+LIST = f"'{sys.executable}' -m hose_mj list models"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="written for a POSIX shell")
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        (f"( {LIST}; echo status $? >&2 ) | true", {0, 141}),
+        (f"{LIST} > /dev/full; echo status $? >&2", {2}),
+        (f"{LIST} >&-; echo status $? >&2", {0}),
+    ],
+)
+def test_an_output_that_ends_is_no_crash(line, wanted):
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=60)
+    *said, last = done.stderr.strip().splitlines()
+    assert int(last.split()[-1]) in wanted
+    assert not any("Traceback" in text or "Exception ignored" in text for text in said)
+
+
+def test_the_package_runs_as_a_program():
+    words = [sys.executable, "-m", "hose_mj", "--version"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert done.stdout == f"hose-mj {hose_mj.__version__}\n"
 
 
 def test_help_loads_nothing_heavy():
     code = (
-        "import sys; from tools import cli; status = cli.main(['--help']);"
+        "import sys; from hose_mj.cli import main as cli; status = cli.main(['--help']);"
         "heavy = {'tyro', 'numpy', 'numba', 'mujoco', 'rerun', 'matplotlib'} & set(sys.modules);"
         "sys.exit(status or (f'loaded {heavy}' if heavy else 0))"
     )

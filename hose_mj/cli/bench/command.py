@@ -15,7 +15,7 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_mj.cli.bench.records import Bench
+    from hose_mj.cli.bench import Bench
 
 GROUPS = {
     "env": "hose_mj.cli.bench.env",

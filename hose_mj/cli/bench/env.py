@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.cli.bench.records import Bench, Record, measure_rate
+from hose_mj.cli.bench import Bench, Record, measure_rate
 from hose_mj.envs.vector import VectorTaskEnv
 from hose_mj.tasks import kernels
 from hose_mj.tasks.registry import make_task

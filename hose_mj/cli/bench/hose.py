@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hose_mj.cli.bench.records import Bench, Record, measure_rate
+from hose_mj.cli.bench import Bench, Record, measure_rate
 from hose_mj.hoses.protocol import HoseModel
 from hose_mj.hoses.registry import make_hose
 from hose_mj.hoses.spec import HoseSpec

@@ -16,7 +16,7 @@ from hose_learning.settings import Exploration
 from hose_learning.study.training import Training
 
 from hose_mj.checks import Check
-from hose_mj.cli.bench.records import Bench, Record, measure_rate
+from hose_mj.cli.bench import Bench, Record, measure_rate
 from hose_mj.tasks.registry import make_task
 
 PEER = "D-RR-QL, N = 3, its source as plain Python"

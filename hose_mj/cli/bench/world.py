@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hose_mj.checks import Check
-from hose_mj.cli.bench.records import Bench, Record, measure_rate
+from hose_mj.cli.bench import Bench, Record, measure_rate
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.recording.rerun import open_sinks
 from hose_mj.rollout.capture import Capture

@@ -9,11 +9,11 @@ import pytest
 
 from hose_mj.checks import Check
 from hose_mj.cli import main as cli
+from hose_mj.cli.bench import Bench, Record, measure_rate
 from hose_mj.cli.bench import command as bench
 from hose_mj.cli.bench import env as bench_env
 from hose_mj.cli.bench import hose as bench_hose
 from hose_mj.cli.bench import learn as bench_learn
-from hose_mj.cli.bench.records import Bench, Record, measure_rate
 
 RECORD = {"group", "name", "value", "unit", "peer", "ratio"}
 

@@ -1,6 +1,6 @@
 """What is left under MuJoCo 4, and what it brings: the reasons for the pin below 4, and its end.
 
-`make test-mujoco4` runs this in a virtual environment of its own, with the flex rod's other tests.
+`make smoke-mujoco4` runs this in a virtual environment of its own.
 """
 
 import math

@@ -14,6 +14,7 @@ import importlib
 import sys
 from typing import TYPE_CHECKING, Any
 
+from hose_mj.moved import MovedFinder
 from hose_mj.version import __version__
 
 if TYPE_CHECKING:
@@ -80,6 +81,9 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES})
+
+
+sys.meta_path.append(MovedFinder())
 
 
 if "gymnasium" in sys.modules:

@@ -42,7 +42,7 @@ def test_a_page_has_an_equation_and_quotes_the_code_as_it_is(id):
     assert text.startswith(f"# `{id}`")
     assert "$$" in text
     assert f"{LEARNERS[id].module.rpartition('.')[2]}.py)" in text or "round_robin.py)" in text
-    quoted = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    quoted = re.findall(r"```python quotation\n(.*?)```", text, re.DOTALL)
     source = {line.strip() for line in find_linked_code(text).splitlines()}
     lines = [line.strip() for block in quoted for line in block.splitlines() if line.strip()]
     assert lines

@@ -16,7 +16,13 @@ PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 # Where a path in backticks may begin.
-STARTS = (ROOT, ROOT / "hose_mj", ROOT / "learning" / "hose_learning")
+STARTS = (
+    ROOT,
+    ROOT / "hose_mj",
+    ROOT / "hose_mj/hoses",
+    ROOT / "learning",
+    ROOT / "learning/hose_learning",
+)
 
 
 class Block(NamedTuple):
@@ -92,6 +98,8 @@ def is_tracked(path):
 def find_missing_path(page, path):
     """Says that a path in backticks leads nowhere, or None; what git ignores is a user's own."""
     tops = {entry.name for entry in ROOT.iterdir()}
+    if re.search(r"-v\d$", path):  # the id of an environment
+        return None
     if not (path.endswith(".py") or path.split("/")[0] in tops) or not is_tracked(path):
         return None
     for one in spread_braces(path):

@@ -52,7 +52,7 @@ def test_a_tension_that_rises_evenly_breaks_at_its_time_and_place(floor):
     assert (found.kind, found.robot, found.other) == ("stretch", None, 0)
     assert found.time == pytest.approx(2.0 / 3.0, abs=1e-6)
     assert found.speed == pytest.approx(3.0)
-    assert found.place == pytest.approx(floor.position(length)[0], abs=1e-6)
+    assert found.place == pytest.approx(floor.hose_position(length)[0], abs=1e-6)
     assert found.margin == pytest.approx(2.0 - 3.0 * 0.67, abs=1e-6)
     # Segment 1 ends at half of the hose.
     assert advance(floor, monitor, load, 200).time == pytest.approx(2.0, abs=1e-6)

@@ -139,9 +139,9 @@ def test_a_ball_thrown_at_the_hose_gives_it_what_it_loses(write_scene):
     errors, pushed = [], 0.0
     for _ in range(100):
         start, fallbacks = add_up(), world.hose.fallbacks
-        before = world._touch.pushes[:, :2].sum(axis=0)
+        before = world._contact.pushes[:, :2].sum(axis=0)
         world.step()
-        after = world._touch.pushes[:, :2].sum(axis=0)
+        after = world._contact.pushes[:, :2].sum(axis=0)
         pushed = max(pushed, float(np.abs(after).max()))
         # Contact reaches the ball one step late. What the source does in a step that was taken in
         # parts is not known.

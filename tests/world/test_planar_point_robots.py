@@ -20,8 +20,8 @@ def run_both(scene, n_steps, control, **options):
 @pytest.mark.parametrize("scheme", ["bdf2", "backward-euler", "sdirk2"])
 def test_pucks_move_as_mujoco_moves_them(scheme):
     fast, slow = run_both("floor_3", 150, [2.0, 1.0, -1.5, 1.0, 0.5, -2.0], scheme=scheme)
-    assert slow.sweeps >= 150
-    assert fast.sweeps < 150
+    assert slow.coupling_iterations >= 150
+    assert fast.coupling_iterations < 150
     for quantity in ("qpos", "qvel", "site_xpos"):
         one, other = getattr(fast.data, quantity), getattr(slow.data, quantity)
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
@@ -42,11 +42,11 @@ def test_a_puck_that_runs_over_the_hose_feels_it_as_mujoco_lets_it():
         for _ in range(230):
             driver.update()
             world.step()
-        pushed.append(world._touch.pushes[:, :3].sum(axis=0))
+        pushed.append(world._contact.pushes[:, :3].sum(axis=0))
     assert np.abs(pushed[0][:2]).max() > 0.01
     np.testing.assert_allclose(pushed[0], pushed[1], atol=1e-5)
     np.testing.assert_allclose(worlds[0].data.qpos, worlds[1].data.qpos, atol=1e-8)
-    assert worlds[0].sweeps < 230
+    assert worlds[0].coupling_iterations < 230
 
 
 def test_pucks_that_may_meet_are_mujocos(write_scene):
@@ -64,7 +64,7 @@ def test_pucks_that_may_meet_are_mujocos(write_scene):
     gap = np.linalg.norm(np.diff(fast.site_positions()[:2], axis=0))
     assert 0.035 < gap < 0.041  # pressed against each other, MuJoCo's contact a little soft
     np.testing.assert_allclose(fast.data.qpos, slow.data.qpos, atol=1e-7)
-    assert 0 < fast.sweeps < slow.sweeps
+    assert 0 < fast.coupling_iterations < slow.coupling_iterations
 
 
 @pytest.mark.parametrize(
@@ -77,16 +77,16 @@ def test_pucks_that_may_meet_are_mujocos(write_scene):
 )
 def test_what_is_more_than_a_puck_is_mujocos(write_scene, change):
     robot = write_scene.slider(0, (0.6, 0.0, 0.0), 0.5, axes="xy", damping=5)
-    assert GedsWorld(write_scene([robot]))._pucks is not None
+    assert GedsWorld(write_scene([robot]))._point_robots is not None
     changed = robot.replace('damping="5"', change)
-    assert GedsWorld(write_scene([changed]))._pucks is None
+    assert GedsWorld(write_scene([changed]))._point_robots is None
 
 
 def test_weight_and_slides_that_are_not_there_count(write_scene):
     # A body on x and z alone falls freely beside its hose, which is light.
     robot = write_scene.slider(0, (0.5, 0.0, 0.0), 2.0, axes="xz", solid=False)
     world = GedsWorld(write_scene([robot], gravity="0 0 -9.81", linear_density=1e-3))
-    assert world._pucks is not None
+    assert world._point_robots is not None
     world.step(40)
     fallen = -float(world.site_positions()[0, 2])
     t = 40 * world.timestep

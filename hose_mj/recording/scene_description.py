@@ -104,23 +104,11 @@ class KindStyle(NamedTuple):
         name: of the kind, as `Margin.kind` has it.
         unit: of its margins, "N" or "m".
         color: of its lines.
-        sentence: what the constraint asks for, for the reader; may be empty.
     """
 
     name: str
     unit: str
     color: Rgb
-    sentence: str = ""
-
-
-KINDS = (
-    KindStyle("stretch", "N", (244, 130, 30)),
-    KindStyle("run-over", "m", (180, 120, 255)),
-    KindStyle("collision", "m", (230, 90, 160)),
-    KindStyle("bounds", "m", (120, 170, 255)),
-    KindStyle("obstacle", "m", (90, 200, 140)),
-)
-"""The styles of a scene that brings none of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +152,7 @@ class SceneDescription:
     source: Array
     settings: dict[str, str] = field(default_factory=dict)
     cell: float = 0.0
-    kinds: tuple[KindStyle, ...] = KINDS
+    kinds: tuple[KindStyle, ...] = ()
 
     def __post_init__(self) -> None:
         check_name("name of a scene", self.name)

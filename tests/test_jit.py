@@ -59,7 +59,7 @@ def test_every_cache_is_named_after_the_fingerprint(name):
     assert made
     for kernel in made:
         mark = jit._find_fingerprint(kernel.py_func)
-        assert mark in kernel._cache._cache_file._index_name
+        assert mark in kernel._cache._cache_file._name
 
 
 def test_an_option_that_numba_does_not_know_is_left_out():

@@ -37,7 +37,7 @@ _OPTIONS: dict[str, Any] = {
 }
 _PACKAGE = Path(__file__).resolve().parent
 _ENVIRONMENT = "_ZN08NumbaEnv"
-_DECLARE = '@"{}" = common global ptr null\n'
+_DECLARE = '@"{}" = common global i64 0\n'
 _MADE: set[Any] = set()
 """What `_decorate` made, to tell ours from other people's."""
 

@@ -9,6 +9,7 @@ length is part of its type, so one source compiles into one specialised version 
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import importlib.util
 import re
@@ -20,10 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite.binding import Linkage, parse_assembly
 from numba import types
 from numba.core import event
 from numba.core.caching import IndexDataCacheFile
-from numba.core.compiler import Flags
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, Flags
 from numba.core.cpu import CPUTargetOptions
 from numba.extending import overload, register_jitable
 
@@ -32,8 +35,9 @@ _OPTIONS: dict[str, Any] = {
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "error_model": "numpy",
 }
-_INLINED: Any = {"error_model": "numpy", "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
+_ENVIRONMENT = "_ZN08NumbaEnv"
+_DECLARE = '@"{}" = common global i64 0\n'
 _MADE: set[Any] = set()
 """What `_decorate` made, to tell ours from other people's."""
 
@@ -52,6 +56,12 @@ def _keep_known(**options: bool) -> dict[str, bool]:
 
 # No allocation inside, which is left out of numba's types: less to compile.
 _BARE = _keep_known(_nrt=False)
+# To be called from C: nobody does that here.
+_NO_C = _keep_known(no_cfunc_wrapper=True)
+# To be called from Python: unpacking a hose's hundred arrays is more code than most kernels.
+_NO_PYTHON = _keep_known(no_cpython_wrapper=True)
+_OPTIONS |= _NO_C
+_INLINED: Any = {"error_model": "numpy", "forceinline": True, **_NO_C}
 
 
 @cache
@@ -146,17 +156,71 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def decorator(function: Callable[..., Any]) -> Any:
         made = numba.njit(**{**_OPTIONS, **options})(function)
-        # None where numba finds no place for a cache, or where NUMBA_DISABLE_JIT is set.
-        own = getattr(getattr(made, "_cache", None), "_impl", None)
-        if own is not None:
-            name = f"{own.filename_base}.{_find_fingerprint(function)}"
-            stamp = own.locator.get_source_stamp()
-            place = made._cache._cache_path
-            made._cache._cache_file = _CacheFiles(place, name, stamp)
+        _name_cache(made, "")
         _MADE.add(made)
+        if _NO_PYTHON and hasattr(made, "get_call_template"):
+            _serve_callers(made, function, options)
         return made
 
     return decorator
+
+
+def _name_cache(made: Any, suffix: str) -> None:
+    # None where numba finds no place for a cache, or where NUMBA_DISABLE_JIT is set.
+    own = getattr(getattr(made, "_cache", None), "_impl", None)
+    if own is not None:
+        name = f"{own.filename_base}{suffix}.{_find_fingerprint(made.py_func)}"
+        stamp = own.locator.get_source_stamp()
+        made._cache._cache_file = _CacheFiles(made._cache._cache_path, name, stamp)
+
+
+class _LinkedLibrary(JITCodeLibrary):
+    """Code that others link into theirs, as is: no machine code is made of it."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._shared_module, names = self._final_module, []
+        for function in self._shared_module.functions:
+            # May be defined in many modules, and dropped where nobody calls it.
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+        for variable in self._shared_module.global_variables:
+            if variable.name.startswith(_ENVIRONMENT):
+                names.append(variable.name)
+        # What numba sets in memory for a function it has compiled, and nothing else.
+        self._final_module = parse_assembly("".join(map(_DECLARE.format, names)))
+        self._final_module.name = self.name
+        super()._finalize_final_module()
+
+
+class _LinkedCompiler(Compiler):
+    """Compiles a function for compiled callers."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compiles a function as numba does, but into a `_LinkedLibrary`."""
+        self.state.library = _LinkedLibrary(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
+        return super().compile_extra(func)
+
+
+def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str, Any]) -> None:
+    """Gives compiled callers a version of a function that Python cannot call.
+
+    The function itself is for Python: it is compiled only where Python calls it.
+    """
+
+    @cache
+    def make_inner() -> Any:
+        settings = {**_OPTIONS, **options, **_NO_PYTHON, "pipeline_class": _LinkedCompiler}
+        inner = numba.njit(**settings)(function)
+        _name_cache(inner, ".inner")
+        return inner
+
+    made.get_call_template = lambda arguments, names: make_inner().get_call_template(
+        arguments, names
+    )
+    made.get_overload = lambda signature: make_inner().get_overload(signature)
 
 
 compiled = _decorate()
@@ -171,9 +235,7 @@ inlined = _decorate(**_BARE, forceinline=True)
 # function would optimize once more.
 merged = _decorate(inline="always")
 # Compiled into compiled callers; for others it stays plain Python, whatever its arguments are.
-jitable: Callable[[Callable[..., Any]], Any] = register_jitable(
-    forceinline=True, error_model="numpy"
-)
+jitable: Callable[[Callable[..., Any]], Any] = register_jitable(**_INLINED)
 
 
 def choose_by_unknowns(choices: Mapping[int, Any]) -> Any:
@@ -239,8 +301,33 @@ class _Notice(event.Listener):
             self._is_shown = False
 
 
+class _GarbageLater(event.Listener):
+    """Keeps Python's garbage collector out of compilations, a tenth of their time.
+
+    Of numba's millions of objects nearly all are needed until the end, so it searches in vain.
+    """
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._is_on = False
+
+    def on_start(self, told: Any) -> None:
+        """Stops the collector where the outermost compilation begins."""
+        self._depth += 1
+        if self._depth == 1:
+            self._is_on = gc.isenabled()
+            gc.disable()
+
+    def on_end(self, told: Any) -> None:
+        """Lets it go on as before."""
+        self._depth -= 1
+        if not self._depth and self._is_on:
+            gc.enable()
+
+
 _NOTICE = _Notice()
-event.register("numba:compile", _NOTICE)  # type: ignore[no-untyped-call]
+for _listener in (_NOTICE, _GarbageLater()):
+    event.register("numba:compile", _listener)  # type: ignore[no-untyped-call]
 
 
 def count_compiled() -> int:
@@ -256,8 +343,3 @@ def compile_notice(about: str) -> Iterator[None]:
         yield
     finally:
         _NOTICE.about = before
-
-
-def run_kernel(kernel: Callable[..., Any], axes: tuple[float, ...], *arguments: Any) -> Any:
-    """Calls a kernel of a hose in a plane or in space."""
-    return kernel(axes, *arguments)

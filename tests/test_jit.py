@@ -59,12 +59,65 @@ def test_every_cache_is_named_after_the_fingerprint(name):
     assert made
     for kernel in made:
         mark = jit._find_fingerprint(kernel.py_func)
-        assert mark in kernel._cache._cache_file._index_name
+        assert mark in kernel._cache._cache_file._name
 
 
 def test_an_option_that_numba_does_not_know_is_left_out():
     assert jit._keep_known(_no_such_option=False) == {}
     assert jit._keep_known(boundscheck=False) == {"boundscheck": False}
+
+
+CALLERS = """
+from hose_mj.jit import kernel
+
+@kernel
+def low(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return x + 1.0
+
+@kernel
+def high(x):
+    return 2.0 * low(x)
+"""
+SECOND = """
+import gc, sys
+from hose_mj.jit import count_compiled, kernel
+from callers import high, low
+
+@kernel
+def other(x):
+    return 3.0 * low(x)
+
+print(other(1.0), count_compiled())
+print(high(1.0), low(1.0), count_compiled())
+try:
+    other(-1.0)
+except ValueError as error:
+    print(error)
+print(gc.isenabled())
+"""
+
+
+def test_what_compiled_callers_link_serves_later_ones_and_python_has_its_own(tmp_path):
+    (tmp_path / "callers.py").write_text(CALLERS)
+    (tmp_path / "second.py").write_text(SECOND)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DEBUG_CACHE": "1"}
+    said = []
+    for program in ("from callers import high; high(1.0)", "import second"):
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
+        said.append(done.stdout)
+    lines = said[1].splitlines()
+    # `low` as `high` has linked it is read again, not compiled; for Python it is compiled now.
+    loaded = [line for line in lines if "data loaded" in line]
+    assert ["inner" in line for line in loaded] == [True, False]
+    assert "callers.low" in loaded[0]
+    assert "callers.high" in loaded[1]
+    answers = [line for line in lines if not line.startswith("[cache]")]
+    assert answers == ["6.0 1", "4.0 2.0 2", "below zero", "True"]
 
 
 NOTICE = """

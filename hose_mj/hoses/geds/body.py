@@ -16,7 +16,6 @@ from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_arc_lengths, check_vector, sample_curve, sample_velocity
 from hose_mj.hoses.protocol import Array, Curve, Energies, Momentum
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.jit import run_kernel
 
 
 class SplineBody:
@@ -78,8 +77,8 @@ class SplineBody:
         """Axial force, shape (k,), N: linear between the means of the spans' middles."""
         s = check_arc_lengths(arc_length, self.spec.length)
         hose = self._hose
-        run_kernel(
-            *(energy.compute_strains, self._axes, hose.tables, hose.elasticity),
+        energy.compute_strains(
+            *(self._axes, hose.tables, hose.elasticity),
             *(self._state.x, self._span, self._strains),
         )
         stiffness = hose.elasticity.axial_stiffness[:, None]
@@ -100,8 +99,8 @@ class SplineBody:
         """
         s = check_arc_lengths(arc_length, self.spec.length)
         if self._spline.has_theta and not self._hose.elasticity.frenet:
-            run_kernel(
-                *(frames.move_frames, self._axes, self._hose.tables, self._constraints.rows.twist),
+            frames.move_frames(
+                *(self._axes, self._hose.tables, self._constraints.rows.twist),
                 *(self._state.x, self._span),
             )
         return mechanics.compute_twist(
@@ -127,8 +126,8 @@ class SplineBody:
     def energies(self) -> Energies:
         """Energies at the present state (thesis A.10, A.15)."""
         hose, twist = self._hose, self._constraints.rows.twist
-        stretching, bending, twisting = run_kernel(
-            *(energy.compute_energy, self._axes, hose.tables, hose.elasticity, twist.frames),
+        stretching, bending, twisting = energy.compute_energy(
+            *(self._axes, hose.tables, hose.elasticity, twist.frames),
             *(self._state.x, self._span, self._strains),
         )
         twisting += 0.5 * float(np.sum(twist.angle**2 / twist.compliance))

@@ -20,7 +20,6 @@ from hose_mj.hoses.geds.integrators import STEPS
 from hose_mj.hoses.geds.point_masses import NEAR, PointMasses, advance_with_masses
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array, Hold
-from hose_mj.jit import run_kernel
 
 
 class BodyCoupling:
@@ -66,9 +65,7 @@ class BodyCoupling:
     def accept_step(self) -> None:
         """Makes the step of the last `try_step` count."""
         d = self._dynamics
-        run_kernel(
-            *(integrators.accept_step, d.axes, d.hose, d.constraints.rows, self._trial, d.state)
-        )
+        integrators.accept_step(*(d.axes, d.hose, d.constraints.rows, self._trial, d.state))
         d.counts[STEPS] += 1
 
     def compute_positions(self) -> Array:

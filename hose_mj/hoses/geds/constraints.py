@@ -26,7 +26,6 @@ from hose_mj.hoses.geds.twist import Twist, find_owners
 from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.protocol import Array, Hold, Reaction
 from hose_mj.hoses.spec import check_number
-from hose_mj.jit import run_kernel
 
 _REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "accepted")
 """What of the twist goes into a snapshot."""
@@ -94,7 +93,7 @@ class ConstraintSet:
             start = twist_segments.make_directors(self._spline, np.zeros(1), self._x)[0]
             twist.frames[0, 6:9] = start[3:] if director is None else director
             axes, tables = self._spline.axes, self._hose.tables
-            run_kernel(transport_frames, axes, tables, twist, self._x, make_span(), twist.frames)
+            transport_frames(axes, tables, twist, self._x, make_span(), twist.frames)
             twist.accepted[:] = twist.frames
         self.rows = self._make_rows(twist)
 

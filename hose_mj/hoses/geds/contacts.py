@@ -17,7 +17,6 @@ from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.obstacles import MOST_POINTS, SINK, ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
-from hose_mj.jit import run_kernel
 
 _CODES = {
     "plane": shapes.PLANE,
@@ -346,7 +345,7 @@ class ContactSet:
         forces = np.zeros((len(self._points), 3))
         reactions = np.zeros((len(touched.geoms), 6))
         x, v = self._state.x, self._state.v
-        run_kernel(contact.compute_forces, self._spline.axes, touched, x, v, forces, reactions)
+        contact.compute_forces(self._spline.axes, touched, x, v, forces, reactions)
         return forces, reactions
 
     def _split(self, rows: Array) -> tuple[Array, Array]:

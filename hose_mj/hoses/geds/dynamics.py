@@ -16,7 +16,6 @@ from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.twist import accept_twist
 from hose_mj.hoses.protocol import Array, Linearization
-from hose_mj.jit import run_kernel
 
 _ENDLESS = float(np.finfo(np.float64).max)
 """A step that changes no velocity (s), yet is finite: contact takes an infinite one for statics."""
@@ -66,8 +65,8 @@ class Dynamics:
 
     def run(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Calls a kernel with what all integrators read and these arguments; returns its answer."""
-        return run_kernel(
-            *(kernel, self.axes, self.hose, self.constraints.rows, self.loads.loads, self.limits),
+        return kernel(
+            *(self.axes, self.hose, self.constraints.rows, self.loads.loads, self.limits),
             *arguments,
         )
 
@@ -75,7 +74,9 @@ class Dynamics:
         """Takes n_steps steps; raises `StepError` for one that no fallback finished."""
         code = integrators.SCHEMES[self.scheme]
         arguments = (code, self.timestep, n_steps, self.state, self.counts)
-        self.check(self.run(integrators.advance, *arguments))
+        explicit = self.scheme == "verlet"
+        kernel = integrators.advance_verlet if explicit else integrators.advance
+        self.check(self.run(kernel, *arguments))
 
     def check(self, verdict: int) -> None:
         """Raises `StepError` unless a step was done."""
@@ -104,7 +105,7 @@ class Dynamics:
         before = [part.copy() for part in changing]
         while verdict != records.DONE and load_steps <= MOST_LOAD_STEPS:
             _copy(before, changing)
-            run_kernel(integrators.start_step, self.axes, rows, np.inf)
+            integrators.start_step(self.axes, rows, np.inf)
             found = self.state.x.copy()
             for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
                 verdict, found = self._iterate(scale, limits, found, work)
@@ -121,7 +122,7 @@ class Dynamics:
         rows.multipliers[:] = work.multipliers[: len(rows.multipliers)]
         rows.before[:] = rows.after
         if len(self.axes) == 3:
-            run_kernel(accept_twist, self.axes, rows.twist, self.state.x)
+            accept_twist(self.axes, rows.twist, self.state.x)
         elif len(self.axes) == 4:
             self._accept_frames(self.state, work)
 
@@ -137,8 +138,8 @@ class Dynamics:
             limits = limits._replace(max_iterations=_RESET_ITERATIONS)
         rows, verdict = self.constraints.rows, records.NOT_CONVERGED
         for _ in range(_STATIC_ITERATIONS // _RESET_ITERATIONS):
-            verdict, more, fell = run_kernel(
-                *(newton.newton, self.axes, self.hose, stage, rows, 1.0, self.loads.loads),
+            verdict, more, fell = newton.newton(
+                *(self.axes, self.hose, stage, rows, 1.0, self.loads.loads),
                 *(scale, limits, state.x, work),
             )
             self.counts[ITERATIONS] += more
@@ -153,7 +154,7 @@ class Dynamics:
 
     def _accept_frames(self, state: integrators.State, work: records.Work) -> None:
         rows = self.constraints.rows
-        run_kernel(frames.accept_frames, self.axes, self.hose, rows, state, work.span)
+        frames.accept_frames(self.axes, self.hose, rows, state, work.span)
 
     # -- small motions ---------------------------------------------------------------------------
 
@@ -172,15 +173,15 @@ class Dynamics:
         work, rows, loads = self.make_work(), self.constraints.rows, self.loads.loads
         x = self.state.x
         work.rate[: len(x)] = self.state.v
-        run_kernel(integrators.start_step, self.axes, rows, np.inf)
-        run_kernel(
-            *(energy.assemble, self.axes, self.hose, rows.twist, 0.0, x, work.rate, np.inf, True),
+        integrators.start_step(self.axes, rows, np.inf)
+        energy.assemble(
+            *(self.axes, self.hose, rows.twist, 0.0, x, work.rate, np.inf, True),
             *(work.span, work.gradient, work.band),
         )
-        run_kernel(newton.add_moments, self.axes, loads, True, x, work)
+        newton.add_moments(self.axes, loads, True, x, work)
         # Within a step without end nothing changes its velocity, but what slides still rubs.
-        run_kernel(
-            *(add_contact, self.axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
+        add_contact(
+            *(self.axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
             *(work.gradient, work.band),
         )
         return work
@@ -193,7 +194,7 @@ class Dynamics:
         for row, compliance in zip(rows.twist.rows, rows.twist.compliance, strict=True):
             stiffness += np.outer(row[:size], row[:size]) / compliance
         work.band[:] = 0.0
-        run_kernel(newton.add_mass, self.axes, self.hose, 1.0, work.band)
+        newton.add_mass(self.axes, self.hose, 1.0, work.band)
         mass = mechanics.make_dense(work.band, size, width)
         return Linearization(mass, stiffness, mechanics.make_dense_rows(rows, size, width))
 

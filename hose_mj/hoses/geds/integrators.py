@@ -28,7 +28,7 @@ from hose_mj.hoses.protocol import Array
 from hose_mj.jit import choose_by_unknowns, compiled, inlined, kernel, merged
 
 SCHEMES = {"backward-euler": 0, "bdf2": 1, "sdirk2": 2, "midpoint": 3, "verlet": 4}
-_BACKWARD_EULER, _BDF2, _SDIRK2, _MIDPOINT, _VERLET = range(5)
+_BACKWARD_EULER, _BDF2, _SDIRK2, _MIDPOINT = range(4)
 _GAMMA = 1.0 - np.sqrt(0.5)
 _NO_CHANGE = 1e200
 """Softness that keeps the twist's rank-one terms out of the mass matrix."""
@@ -295,27 +295,39 @@ def _step_verlet(axes, hose, constraints, loads, dt, state, work):
     return DONE
 
 
+@inlined
+def _keep_multipliers(constraints, work, counts):
+    """Counts a step that is done and keeps its multipliers and mean forces."""
+    counts[STEPS] += 1
+    for row in range(len(constraints.start)):
+        constraints.multipliers[row] = work.multipliers[row]
+    response = constraints.response
+    for row in range(len(response.compliance)):
+        force = response.base[row] + response.share[0] * work.multipliers[row]
+        response.force[row] = force
+
+
 @kernel
 def take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
-    """Takes one step, but for what `end_step` does; returns a verdict.
+    """Takes one step of an implicit scheme, but for what `end_step` does; returns a verdict.
 
     It allocates nothing, so numba counts no references to the arrays in its records: to count them
     would cost a short hose nearly as much as the step itself.
     """
-    if scheme == _VERLET:
-        verdict = _step_verlet(axes, hose, constraints, loads, dt, state, work)
-    else:
-        verdict = _step_implicit(
-            axes, hose, constraints, loads, limits, scheme, dt, state, work, counts
-        )
+    verdict = _step_implicit(
+        axes, hose, constraints, loads, limits, scheme, dt, state, work, counts
+    )
     if verdict == DONE:
-        counts[STEPS] += 1
-        for row in range(len(constraints.start)):
-            constraints.multipliers[row] = work.multipliers[row]
-        response = constraints.response
-        for row in range(len(response.compliance)):
-            force = response.base[row] + response.share[0] * work.multipliers[row]
-            response.force[row] = force
+        _keep_multipliers(constraints, work, counts)
+    return verdict
+
+
+@kernel
+def _take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts):
+    """`take_step` for Verlet, apart from it: compiled only for those who use it."""
+    verdict = _step_verlet(axes, hose, constraints, loads, dt, state, work)
+    if verdict == DONE:
+        _keep_multipliers(constraints, work, counts)
     return verdict
 
 
@@ -334,14 +346,28 @@ def end_step(axes, hose, constraints, state, p):
 def advance(axes, hose, constraints, loads, limits, scheme, dt, n_steps, state, counts):
     """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
 
-    A step that fails leaves the state at the step before it; `counts` says how many were done. Ten
-    arguments: it is the one entry to the dynamics. It makes its work arrays itself, which is
-    quicker than handing them over from Python.
+    Of an implicit scheme; `advance_verlet` is for the explicit one. A step that fails leaves the
+    state at the step before it; `counts` says how many were done. Ten arguments: it is the one
+    entry to the dynamics. It makes its work arrays itself, which is quicker than handing them over
+    from Python.
     """
     n_rows = len(constraints.start) + len(constraints.twist.angle)
     work = make_work(hose.mass.shape[0], len(axes), n_rows)
     for _ in range(n_steps):
         verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
+        if verdict != DONE:
+            return verdict
+        end_step(axes, hose, constraints, state, work.span)
+    return DONE
+
+
+@compiled
+def advance_verlet(axes, hose, constraints, loads, limits, scheme, dt, n_steps, state, counts):
+    """`advance` for Verlet; no iteration, so neither limits nor the scheme's number are read."""
+    n_rows = len(constraints.start) + len(constraints.twist.angle)
+    work = make_work(hose.mass.shape[0], len(axes), n_rows)
+    for _ in range(n_steps):
+        verdict = _take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts)
         if verdict != DONE:
             return verdict
         end_step(axes, hose, constraints, state, work.span)

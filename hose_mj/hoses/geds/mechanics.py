@@ -19,7 +19,7 @@ from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.jit import compile_notice, run_kernel
+from hose_mj.jit import compile_notice
 
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
@@ -118,7 +118,7 @@ def _average(spec: HoseSpec, name: str, cells: Array, convert: Callable[[float],
 def multiply_mass(axes: tuple[float, ...], hose: records.Hose, flat: Array) -> Array:
     """Returns M times a flat vector."""
     out = np.zeros(len(flat))
-    run_kernel(newton.multiply_mass, axes, hose, 1.0, flat, out)
+    newton.multiply_mass(axes, hose, 1.0, flat, out)
     return out
 
 

@@ -195,7 +195,8 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
     """
     twist = constraints.twist
     fallbacks = shortened = 0
-    exact = True
+    # True, but no constant: for one numba would compile all that takes it twice.
+    exact = fallbacks == 0
     factor = slope = 0.0
     iteration = 1
     softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import compiled, inlined
+from hose_mj.jit import inlined, jitable
 
 SMALLEST_A = 0.01
 """A below which |a| and A are continued by polynomials."""
@@ -81,9 +81,9 @@ class Span(NamedTuple):
     block: Array
 
 
-@compiled
+@jitable
 def make_span():
-    """Returns work arrays for one thread."""
+    """Returns work arrays for one thread; plain Python where Python calls it."""
     return Span(
         np.zeros((3, 4)),
         np.zeros((3, 4)),

@@ -16,7 +16,6 @@ from hose_mj.hoses.geds.span import LEAST_TURN_ROOM, make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners, measure_twist
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import run_kernel
 
 _NODES = np.polynomial.legendre.leggauss(3)[0]
 _LAGRANGE = [
@@ -149,7 +148,7 @@ def take_over_twist(
 
     def measure(k: int) -> float:
         new.trial[:] = wanted
-        run_kernel(measure_twist, spline.axes, hose.tables, new, x, span)
+        measure_twist(spline.axes, hose.tables, new, x, span)
         return float(new.trial[k])
 
     for k in range(anchor, len(wanted)):
@@ -220,7 +219,7 @@ def part_ends(spline: Spline, hose: Hose, twist: Twist, x: Array) -> Twist:
         torque=np.zeros_like(angle),
         rows=np.zeros((len(angle), twist.rows.shape[1])),
     )
-    run_kernel(measure_twist, spline.axes, hose.tables, parted, x, make_span())
+    measure_twist(spline.axes, hose.tables, parted, x, make_span())
     gap = float(parted.trial[0] - angle[0])
     for clamp in (0, len(parted.starts) - 1):
         turn_director(parted, clamp, gap)

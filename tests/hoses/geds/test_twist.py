@@ -9,7 +9,6 @@ from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import Fitting, HoseSpec
-from hose_mj.jit import run_kernel
 
 EI, GJ, DENSITY, GRAVITY = 0.05, 0.04, 0.1, 9.81
 X, Y, Z = np.eye(3)
@@ -296,7 +295,7 @@ def measure_variation_error(n):
     span, step = make_span(), 1e-6
 
     def measure(shape):
-        run_kernel(twist.measure_twist, spline.axes, hose.tables, clamps, shape, span)
+        twist.measure_twist(spline.axes, hose.tables, clamps, shape, span)
         return clamps.trial[0]
 
     by_difference = np.zeros(len(x))

@@ -116,7 +116,10 @@ class Monitor:
         ]
         self._prepare(world.centre_line().arc_lengths)
         self.kinds = tuple(KINDS[k].name for k, _, _ in self._margins)
-        self.names = tuple(_name_margin(*margin) for margin in self._margins)
+        self.names = tuple(
+            f"{KINDS[k].name} {'-'.join(str(n) for n in members if n is not None)}"
+            for k, *members in self._margins
+        )
         self.units = tuple(KINDS[k].unit for k, _, _ in self._margins)
         nearest = [self._tables.tension, *self._tables.clearances[1:]]
         texts = [kind.limit.format(limit=most) for kind, most in zip(KINDS, nearest, strict=True)]
@@ -169,7 +172,15 @@ class Monitor:
         """Makes the tables for a centre line with pieces between these arc lengths."""
         self._arcs, world = arcs, self.world
         self._tables = make_tables(world, self.limits, self._footprints, self._obstacles, arcs)
-        self._probe = self._make_probe(arcs)
+        t = self._tables
+        # Those geoms of robots that the kernels cannot measure.
+        strange = [
+            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == OTHER_KIND]
+            for low, high in pairwise(t.robot_rows)
+        ]
+        self._probe: HoseProbe | None = None
+        if any(strange):
+            self._probe = HoseProbe(world.model, strange, t.own, t.radius, arcs)
 
     def _measure(self) -> _Measurement:
         world = self.world
@@ -238,15 +249,6 @@ class Monitor:
         body = model.body(model.geom_bodyid[geom]).name
         return str(model.geom(geom).name) or f"geom {geom} of {body}"
 
-    def _make_probe(self, arcs: Array) -> HoseProbe | None:
-        """A probe for those geoms of robots that the kernels cannot measure, where there are."""
-        t = self._tables
-        strange = [
-            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == OTHER_KIND]
-            for low, high in pairwise(t.robot_rows)
-        ]
-        return HoseProbe(self.world.model, strange, t.own, t.radius, arcs) if any(strange) else None
-
 
 def make_tables(
     world: World,
@@ -314,11 +316,6 @@ def find_watched(world: World, obstacles: Ints) -> Watched:
     """Returns what decides which margins there are; `obstacles` (H,) are geoms."""
     has_bounds = bool(np.any(np.isfinite(world.scene.bounds)))
     return Watched(world.n_robots, has_bounds, len(obstacles) > 0)
-
-
-def _name_margin(k: int, robot: int | None, other: int | None) -> str:
-    numbers = [str(n) for n in (robot, other) if n is not None]
-    return f"{KINDS[k].name} {'-'.join(numbers)}"
 
 
 def split_hose(arcs: Array, attachments: Array) -> tuple[Ints, Array]:

@@ -72,10 +72,6 @@ class DmEnv(dm_env.Environment):
         """Returns a copy of the task's state, with turn and step count before it."""
         return self.env.state()
 
-    def close(self) -> None:
-        """Ends the rendering."""
-        self.env.close()
-
 
 def make_spec(space: spaces.Space[Any], name: str) -> Any:
     """Makes the spec of a Discrete, MultiDiscrete or Dict space."""

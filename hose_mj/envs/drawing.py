@@ -99,9 +99,6 @@ class Renderer:
             return encode_moments(self.task, self._history)
         return None
 
-    def close(self) -> None:
-        """Ends the drawing."""
-
     def _write(self, episode: Episode) -> str:
         return write_picture(make_picture(self.task, episode.state, episode.events))
 

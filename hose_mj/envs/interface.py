@@ -78,10 +78,6 @@ class Interface:
         """Returns the picture that `render_mode` asks for; None without one."""
         return self._renderer.render(self.episode)
 
-    def close(self) -> None:
-        """Ends the rendering; may be called again."""
-        self._renderer.close()
-
 
 class AgentsInterface(Interface):
     """An environment of agents by name, as PettingZoo has them.

@@ -233,7 +233,8 @@ class _Sheet:
         pen, at, color, thin = self.pen, mark.at, mark.color, max(_FINE, self.cell // 20)
         label_at, label_size, label_color = at, 0.5, _PAPER
         if mark.kind in (STATION, GOAL):
-            pen.rectangle(self.box(at, 0.46), fill=_pale(color))
+            pale = tuple(round(0.72 * 255 + 0.28 * part) for part in color)
+            pen.rectangle(self.box(at, 0.46), fill=pale)
             label_color = color
         if mark.kind == STATION:
             label_at, label_size = (at[0] - 0.28, at[1] + 0.25), 0.3
@@ -264,8 +265,3 @@ def _load_font(size: int) -> Any:
     from PIL import ImageFont
 
     return ImageFont.load_default(size)
-
-
-def _pale(color: Rgb) -> Rgb:
-    red, green, blue = (round(0.72 * 255 + 0.28 * part) for part in color)
-    return red, green, blue

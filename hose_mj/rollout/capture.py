@@ -33,21 +33,15 @@ from hose_mj.recording.world_episode import (
     WorldEpisode,
 )
 from hose_mj.world.geds_world import GedsWorld
+from hose_mj.world.scene_geoms import KIND_NAMES
 from hose_mj.world.world import World
 
 KIND_STYLES = tuple(KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
 N_POINTS = 81
 """Points along the hose that are recorded."""
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows geoms and sites of groups 0, 1 and 2
-_KINDS = {
-    int(mujoco.mjtGeom.mjGEOM_PLANE): "plane",
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
-    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
-    int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
-}
+_ELLIPSOID, _MESH = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID), int(mujoco.mjtGeom.mjGEOM_MESH)
+_KINDS = {**KIND_NAMES, _ELLIPSOID: "ellipsoid", _MESH: "mesh"}
 
 
 class SceneBodies:
@@ -96,8 +90,8 @@ class SceneBodies:
         number = self._numbers.index(body) if body in self._numbers else WORLD
         if number == WORLD:
             place(position, quaternion, self.data.xpos[body], self.data.xquat[body])
-        vertices, faces = read_mesh(model, int(model.geom_dataid[i]))
-        is_mesh = model.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH
+        is_mesh = model.geom_type[i] == _MESH
+        vertices, faces = read_mesh(model, int(model.geom_dataid[i])) if is_mesh else (None, None)
         return Geom(
             name=model.geom(i).name or f"{model.body(body).name} geom {i}",
             kind=_KINDS[int(model.geom_type[i])],
@@ -106,8 +100,8 @@ class SceneBodies:
             body=number,
             position=position,
             quaternion=quaternion,
-            vertices=vertices if is_mesh else None,
-            faces=faces if is_mesh else None,
+            vertices=vertices,
+            faces=faces,
         )
 
     def make_goal(self, name: str) -> Geom:
@@ -266,10 +260,8 @@ def to_bytes(rgba: Array) -> Rgba:
     return red, green, blue, opacity
 
 
-def read_mesh(model: mujoco.MjModel, mesh: int) -> tuple[Array | None, Array | None]:
-    """Returns vertices (v, 3) and triangles (f, 3) of a mesh; None, None without one."""
-    if mesh < 0:
-        return None, None
+def read_mesh(model: mujoco.MjModel, mesh: int) -> tuple[Array, Array]:
+    """Returns vertices (v, 3) and triangles (f, 3) of a mesh."""
     vertex, face = int(model.mesh_vertadr[mesh]), int(model.mesh_faceadr[mesh])
     vertices = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[mesh])]
     faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]

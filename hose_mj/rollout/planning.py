@@ -86,7 +86,10 @@ class FreeCells:
         while queue:
             _, cell = heapq.heappop(queue)
             if cell == goal:
-                return _walk_back(before, goal)
+                path = [goal]
+                while path[-1] in before:
+                    path.append(before[path[-1]])
+                return path[::-1]
             for step in _STEPS if self._spatial else _LEVEL_STEPS:
                 following = (cell[0] + step[0], cell[1] + step[1], cell[2] + step[2])
                 if max(map(abs, following)) > reach:
@@ -196,14 +199,6 @@ class _Trail:
 
 def _distance(cell: Cell, goal: Cell) -> float:
     return float(np.linalg.norm(np.subtract(cell, goal)))
-
-
-def _walk_back(before: dict[Cell, Cell], cell: Cell) -> list[Cell]:
-    path = [cell]
-    while cell in before:
-        cell = before[cell]
-        path.append(cell)
-    return path[::-1]
 
 
 _STEPS: list[Cell] = [

@@ -19,8 +19,7 @@ import numpy as np
 
 from hose_mj.constraints.kinds import KIND_OF, KINDS
 from hose_mj.constraints.monitor import Break, Monitor
-from hose_mj.errors import InputError, StepError
-from hose_mj.hoses.inputs import check_choice
+from hose_mj.errors import InputError, StepError, check_choice
 from hose_mj.rollout import scripts
 from hose_mj.rollout.episode import Policy, is_at_goal
 from hose_mj.rollout.planning import GoalPlan
@@ -142,7 +141,10 @@ class Breaking(_Scripted):
         driver = Driver(world)
         list_scripts = getattr(scripts, KIND_OF[self.kind].script)
         rehearsal = Rehearsal(world, monitor, ends_at_goal=False)
-        found, trials = rehearsal.find(list_scripts(driver), self._is_wanted)
+        found, trials = rehearsal.find(
+            list_scripts(driver),
+            lambda one: one.broken is not None and one.broken.kind == self.kind,
+        )
         if found is None:
             valid = (
                 f"a scene with room for it: here {len(trials)} ways were tried, and each broke "
@@ -150,9 +152,6 @@ class Breaking(_Scripted):
             )
             raise InputError("policy", f"break-{self.kind}", valid)
         self._play(driver, found.script, found.script.robot, f"break {self.kind}")
-
-    def _is_wanted(self, trial: RehearsedScript) -> bool:
-        return trial.broken is not None and trial.broken.kind == self.kind
 
 
 _BREAKABLE = sorted(KINDS, key=lambda kind: not kind.other)

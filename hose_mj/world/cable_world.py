@@ -49,6 +49,7 @@ class CableWorld(MujocoWorld):
     """
 
     hose_model = "cable"
+    _advice = "try more substeps, fewer segments or a lower torsional stiffness"
 
     def __init__(
         self,
@@ -74,6 +75,7 @@ class CableWorld(MujocoWorld):
             substeps = math.ceil(timestep / most * (1.0 - 1e-9))
         nodes = self._layout.nodes.copy()
         nodes[-1] = spec.length
+        self._tension_places = nodes[1:-1]
         super().__init__(scene, nodes, Numerics(timestep, substeps, "discrete", "sparse"))
 
     def _locate_holds(self, scene: Scene) -> list[tuple[int, float]]:
@@ -129,14 +131,6 @@ class CableWorld(MujocoWorld):
     def _read_tensions(self) -> Array:
         mujoco.mj_rnePostConstraint(self.model, self.data)
         return self._read_motion().joint_tensions(self.data, self.hose_bodies)
-
-    @property
-    def _tension_places(self) -> Array:
-        return self.nodes[1:-1]
-
-    @property
-    def _advice(self) -> str:
-        return "try more substeps, fewer segments or a lower torsional stiffness"
 
 
 def compute_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffness: float) -> float:

@@ -45,6 +45,7 @@ class Driver:
         targets: where the sites are to be (N, 3), m; at first where they are.
         speed: highest speed (m/s).
         axes: along how many axes each robot is driven (N,): 3 or, in the plane, 2.
+        wheeled: numbers of the robots that steer.
 
     Raises:
         InputError: an actuator that is no motor, a robot that neither servo can drive, a number
@@ -63,7 +64,7 @@ class Driver:
         self.world, self.speed = world, speed
         self.targets = world.site_positions()[:-1]
         self.axes = np.full(world.n_robots, 2)
-        self._wheeled: list[int] = []
+        self.wheeled: tuple[int, ...] = ()
         sliding: list[Motors] = []
         servos: list[ArmServo | WheelServo | SlideServo] = []
         self._motors = find_motors(world)
@@ -78,18 +79,13 @@ class Driver:
                 else:
                     servos.append(ArmServo(world, chain, bandwidth, speed))
             elif WheelServo.fits(world, wheels):
-                self._wheeled.append(motors.robot)
+                self.wheeled += (motors.robot,)
                 servos.append(WheelServo(world, wheels, speed))
             else:
                 raise _refuse(world, motors)
         if sliding:
             servos.append(SlideServo(world, sliding, bandwidth, speed))
         self._servos = tuple(servos)
-
-    @property
-    def wheeled(self) -> tuple[int, ...]:
-        """Numbers of the robots that steer."""
-        return tuple(self._wheeled)
 
     def drive_to(self, targets: ArrayLike) -> None:
         """Sets where the robots' sites are to be.

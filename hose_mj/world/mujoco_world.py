@@ -18,13 +18,14 @@ from hose_mj.errors import StepError
 from hose_mj.hoses.inputs import check_arc_lengths, check_count
 from hose_mj.hoses.mujoco.chain import check_plain
 from hose_mj.hoses.mujoco.chain_holds import find_rows
-from hose_mj.hoses.mujoco.flex_layout import interpolate
-from hose_mj.hoses.mujoco.model import Motion, mute_warnings, went_bad
+from hose_mj.hoses.mujoco.chain_motion import ChainMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexMotion, interpolate
+from hose_mj.hoses.mujoco.model import mute_warnings, went_bad
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
-from hose_mj.world.initial_shape import make_initial_shape
+from hose_mj.world.initial_shape import N_POINTS, relax_initial_shape
 from hose_mj.world.mujoco_scene import (
     PREFIX,
     HoseContact,
@@ -65,6 +66,11 @@ class MujocoWorld(World):
         InputError: a value outside its valid set, a hose or a scene that MuJoCo cannot model.
     """
 
+    _advice: str
+    """What to try where the hose is unstable."""
+    _tension_places: Array
+    """Arc lengths where tensions are known (m)."""
+
     def __init__(self, scene: Scene, nodes: Array, numerics: Numerics) -> None:
         check_plain(type(self).__name__, scene.spec)
         self.nodes, self.substeps = nodes, numerics.substeps
@@ -79,14 +85,15 @@ class MujocoWorld(World):
         first = int(model.body_dofadr[self.hose_bodies[0]])
         self._joints = slice(first, first + int(model.body_dofnum[self.hose_bodies].sum()))
         self._holds = [model.equality(f"{PREFIX}hold{k}").id for k in range(len(self.arc_lengths))]
-        self._motion: Motion | None = None
+        self._motion: ChainMotion | FlexMotion | None = None
         self._forces = np.zeros((len(self.arc_lengths), 3))
         self._tensions = np.zeros(0)
         self._start_bodies()
         places = self.site_positions()
-        curve = make_initial_shape(
+        relaxed = relax_initial_shape(
             scene.spec, places, self.arc_lengths, obstacles, np.array(self.model.opt.gravity)
         )
+        curve = relaxed.position(np.linspace(0.0, scene.spec.length, N_POINTS))
         self._start = fit_curve(curve, nodes, self.arc_lengths, places)
         self.reset()
         met = self.hose_position(self.arc_lengths) - self.site_positions()
@@ -114,22 +121,12 @@ class MujocoWorld(World):
         """Writes the qpos of the hose with its nodes at (K + 1, 3), m."""
 
     @abstractmethod
-    def _read_motion(self) -> Motion:
+    def _read_motion(self) -> ChainMotion | FlexMotion:
         """Reads how the hose lies and moves now."""
 
     @abstractmethod
     def _read_tensions(self) -> Array:
         """Tensions in MuJoCo's last step, where `_tension_places` says."""
-
-    @property
-    @abstractmethod
-    def _tension_places(self) -> Array:
-        """Arc lengths where tensions are known (m)."""
-
-    @property
-    @abstractmethod
-    def _advice(self) -> str:
-        """What to try where the hose is unstable."""
 
     # -- the world's protocol ----------------------------------------------------------------------
 
@@ -223,7 +220,7 @@ class MujocoWorld(World):
         self._motion = None
         self._update_poses()
 
-    def _move(self) -> Motion:
+    def _move(self) -> ChainMotion | FlexMotion:
         if self._motion is None:
             self._motion = self._read_motion()
         return self._motion

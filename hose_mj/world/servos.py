@@ -298,15 +298,10 @@ _PARALLEL = 1e-3
 _SHARE_OF_GRIP = 0.25
 """Acceleration that braking counts on, as a share of gravity's."""
 _ROUND = {
-    int(kind)
-    for kind in (
-        mujoco.mjtGeom.mjGEOM_SPHERE,
-        mujoco.mjtGeom.mjGEOM_CAPSULE,
-        mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        mujoco.mjtGeom.mjGEOM_CYLINDER,
-        mujoco.mjtGeom.mjGEOM_MESH,
-    )
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
+    for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "MESH")
 }
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 
 
 class WheelServo:
@@ -409,6 +404,3 @@ def _compute_wheel_radius(model: mujoco.MjModel, body: int) -> float:
         and (model.geom_contype[g] or model.geom_conaffinity[g])
     ]
     return max(radii, default=0.0)
-
-
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)

@@ -57,6 +57,7 @@ def make_learner(
     vetoed = make_arrays(task, vetoes, task.n_agents)
     thresholds = np.array([-np.inf if m.threshold is None else m.threshold for m in values])
     exploration = settings.exploration
+    has_none = settings.fallback == "none" and "none" in task.action_names
     learner = Learner(
         rule=rule,
         columns=seen.columns,
@@ -76,7 +77,7 @@ def make_learner(
         return_of_event=task.kernel.reward_table.sum(axis=1),
         mediator=MEDIATORS[settings.mediator],
         policy=POLICIES.index(exploration.policy),
-        fallback=_find_fallback(task, settings),
+        fallback=task.action_names.index("none") if has_none else -1,
         learning_rate=float(settings.learning_rate),
         learning_rate_decay=float(settings.learning_rate_decay),
         per_episode=float(exploration.per_episode),
@@ -88,12 +89,6 @@ def make_learner(
     veto_table = make_table(vetoed.size, 1, np.int64, settings.hashed)
     memory = _make_memory(task, exploration, table, veto_table, (len(values), len(vetoes)), own)
     return learner, memory._replace(stream=make_stream(generator), starts=make_stream(generator))
-
-
-def _find_fallback(task: Task, settings: LearnerSettings) -> int:
-    """Returns the number of the action that is left where all are vetoed, -1 for any."""
-    has_none = settings.fallback == "none" and "none" in task.action_names
-    return task.action_names.index("none") if has_none else -1
 
 
 def _make_memory(

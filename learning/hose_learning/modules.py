@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.task import Task
 from hose_mj.tasks.variables import LARGEST_SIZE
@@ -52,9 +52,7 @@ class Module:
 
     def __post_init__(self) -> None:
         for name, choices in (("kind", get_args(Kind)), ("credit", get_args(Credit))):
-            if getattr(self, name) not in choices:
-                valid = "one of " + ", ".join(choices)
-                raise InputError(f"{name} of module {self.name}", getattr(self, name), valid)
+            check_choice(f"{name} of module {self.name}", getattr(self, name), choices)
 
 
 @dataclass(frozen=True)
@@ -118,8 +116,7 @@ def make_module_rewards(task: Task, modules: Sequence[Module]) -> Floats:
     rewards = np.zeros((len(table), 2, len(modules)))
     for place, module in enumerate(modules):
         for signal in module.signals:
-            if signal not in task.rewards:
-                raise InputError("signal", signal, "one of " + ", ".join(task.rewards))
+            check_choice("signal", signal, task.rewards)
             column = task.rewards.index(signal)
             rewards[:, 1, place] += table[:, column]
             if module.credit == "cycle":
@@ -141,7 +138,6 @@ def make_masks(thing: str, names: Sequence[str], chosen: Sequence[Sequence[str]]
     """
     masks = np.zeros(len(chosen), np.int64)
     for place, name in ((place, name) for place, own in enumerate(chosen) for name in own):
-        if name not in names:
-            raise InputError(thing, name, "one of " + ", ".join(names))
+        check_choice(thing, name, names)
         masks[place] |= 1 << names.index(name)
     return masks

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hose_learning.modules import Module
-from hose_mj.errors import InputError
+from hose_mj.errors import check_choice
 from hose_mj.tasks.task import Task
 
 VALUES = ("goal", "local", "monolithic")
@@ -77,10 +77,8 @@ def make_modules(
     Raises:
         InputError: an unknown choice.
     """
-    if values not in VALUES:
-        raise InputError("values", values, "one of " + ", ".join(VALUES))
-    if vetoes not in VETOES:
-        raise InputError("vetoes", vetoes, "one of " + ", ".join(VETOES))
+    check_choice("values", values, VALUES)
+    check_choice("vetoes", vetoes, VETOES)
     parts = find_parts(task)
     if values == "monolithic":
         goal = Module(name="monolithic", variables=parts.state, signals=task.rewards)

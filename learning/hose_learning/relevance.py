@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from hose_learning.experience import Bools, Experience
 from hose_learning.modules import Module
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.task import Task
 
@@ -238,6 +238,5 @@ def make_veto_modules(relevance: Relevance) -> tuple[Module, ...]:
 
 def _find(thing: str, name: str, names: tuple[str, ...]) -> int:
     """Returns a name's place among all."""
-    if name not in names:
-        raise InputError(thing, name, "one of " + ", ".join(names))
+    check_choice(thing, name, names)
     return names.index(name)

@@ -348,11 +348,7 @@ def _make(
 
 def list_vetoes(training: Training) -> set[tuple[int, int]]:
     """Returns all vetoed pairs of a veto module's state and an action."""
-    table, n_actions = training.memory.vetoes, training.task.n_actions
-    vetoes: set[tuple[int, int]] = set()
-    hashed = len(table.keys) > 0
-    for row in np.flatnonzero(table.rows[:-1, 0]).tolist():
-        key = int(table.keys[row]) - 1 if hashed else row
-        bits = int(table.rows[row, 0])
-        vetoes |= {(key, action) for action in range(n_actions) if bits >> action & 1}
-    return vetoes
+    table = training.memory.vetoes
+    keys, places = list_written(table)
+    bits = table.rows[places, 0, None] >> np.arange(training.task.n_actions) & 1
+    return {(int(keys[k]), int(action)) for k, action in np.argwhere(bits)}

@@ -168,9 +168,3 @@ class BallJoints(ChainKind):
     def freedoms(self, segments: int, rooted: bool) -> Array:
         """All, but for a root those of the first segment."""
         return np.eye(3 + 3 * segments)[6 if rooted else 0 :]
-
-    def check_points(self, name: str, points: Array) -> None:
-        """Any point will do."""
-
-    def check_tangent(self, tangent: Array) -> None:
-        """Any direction will do."""

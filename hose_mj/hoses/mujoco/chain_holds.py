@@ -162,23 +162,6 @@ def find_rows(data: mujoco.MjData, equality: int) -> np.ndarray:
     )
 
 
-def compute_root_reaction(data: mujoco.MjData, held: Held, body: int) -> Reaction:
-    """Returns what the world does to the first segment that is part of it."""
-    wrench = data.cfrc_int[body]
-    force = wrench[3:].copy()
-    arm = data.subtree_com[body] - held.position
-    return Reaction(force, wrench[:3] + np.cross(arm, force))
-
-
-def make_layout(
-    length: float, segments: int, held: Sequence[Held], *, clamp_correction: bool
-) -> ChainLayout:
-    """Returns the layout that clamps at the ends ask for."""
-    clamped = {item.hold.arc_length for item in held if item.hold.fixes_tangent}
-    first, last = clamp_correction and 0.0 in clamped, clamp_correction and length in clamped
-    return ChainLayout(length, segments, first, last)
-
-
 def check_segments(layout: ChainLayout, held: Sequence[Held]) -> None:
     """Raises `InputError` for two holds on one rigid segment."""
     arc_lengths = np.array([item.hold.arc_length for item in held])

@@ -177,10 +177,8 @@ class ChainKind(ABC):
     def freedoms(self, segments: int, rooted: bool) -> Array:
         """Orthonormal rows (n, 3 + 3 N): the velocities and spins that this chain can have."""
 
-    @abstractmethod
-    def check_points(self, name: str, points: Array) -> None:
-        """Raises `InputError` for points (k, 3), m, where this chain cannot be."""
+    def check_points(self, name: str, points: Array) -> None:  # noqa: B027
+        """Raises `InputError` for points (k, 3), m, where this chain cannot be; by default none."""
 
-    @abstractmethod
-    def check_tangent(self, tangent: Array) -> None:
-        """Raises `InputError` for a unit tangent that this chain cannot have."""
+    def check_tangent(self, tangent: Array) -> None:  # noqa: B027
+        """Raises `InputError` for a unit tangent that this chain cannot have; by default none."""

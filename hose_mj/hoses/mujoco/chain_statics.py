@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from hose_mj.hoses.mujoco.chain_holds import Held, Load
 from hose_mj.hoses.mujoco.chain_layout import (
     ChainKind,
     ChainLayout,
@@ -35,24 +36,6 @@ class BodyPoint:
 
 
 @dataclass(frozen=True)
-class StaticHold:
-    """A point held at a position (3,), m, and for a clamp a frame (4,)."""
-
-    point: BodyPoint
-    position: Array
-    frame: Array | None
-
-
-@dataclass(frozen=True)
-class StaticLoad:
-    """A fixed force (3,) N and moment (3,) N m at a point of a segment."""
-
-    point: BodyPoint
-    force: Array
-    moment: Array
-
-
-@dataclass(frozen=True)
 class StaticChain:
     """A compiled chain: its joints, model, body ids, whether its first segment is fixed, nodes."""
 
@@ -70,8 +53,8 @@ class ChainSystem(StaticSystem):
         chain: the hose.
         start: its first node (3,), m.
         frames: of its segments (N, 4).
-        holds: equality constraints, as exact ones.
-        loads: point loads.
+        holds: equality constraints, as exact ones, each with the point that is held.
+        loads: point loads, each with its point.
 
     Attributes:
         scale: sum of the moments that weight, loads and stiffness can make (N m).
@@ -85,8 +68,8 @@ class ChainSystem(StaticSystem):
         chain: StaticChain,
         start: Array,
         frames: Array,
-        holds: list[StaticHold],
-        loads: list[StaticLoad],
+        holds: list[tuple[BodyPoint, Held]],
+        loads: list[tuple[BodyPoint, Load]],
     ) -> None:
         self.chain, self.holds, self.loads = chain, holds, loads
         self.model, self.data = chain.model, mujoco.MjData(chain.model)
@@ -94,17 +77,12 @@ class ChainSystem(StaticSystem):
         self.n_unknowns = len(self._freedoms)
         length, mass = chain.layout.length, float(self.model.body_mass.sum())
         pull = mass * float(np.linalg.norm(self.model.opt.gravity))
-        pull += sum(float(np.linalg.norm(load.force)) for load in loads)
-        bend = sum(float(np.linalg.norm(load.moment)) for load in loads)
+        pull += sum(float(np.linalg.norm(load.force)) for _, load in loads)
+        bend = sum(float(np.linalg.norm(load.moment)) for _, load in loads)
         self.scale = pull * length + bend + chain.kind.stiffness[1] / length
         self.softest = 1e-6 * self.scale / (mass * length**2)
-        self.conservative = not any(np.any(load.moment) for load in loads)
+        self.conservative = not any(np.any(load.moment) for _, load in loads)
         self.set_pose((start, frames))
-
-    @property
-    def qpos(self) -> Array:
-        """Present joint coordinates, a copy."""
-        return np.array(self.data.qpos)
 
     def set_pose(self, pose: tuple[Array, Array]) -> None:
         """Moves the first node and the frames there and updates the kinematics."""
@@ -124,7 +102,7 @@ class ChainSystem(StaticSystem):
         if self.chain.kind.stiffness[0] != 0.0:
             return
         start, frames = self.pose[0], self.pose[1].copy()
-        held = {hold.point.body for hold in self.holds if hold.frame is not None}
+        held = {point.body for point, item in self.holds if item.hold.fixes_tangent}
         for k in range(1, len(frames)):
             if self.chain.bodies[k] not in held:
                 frames[k] = turn_frame(frames[k - 1], rotation_matrix(frames[k])[:, 0])
@@ -137,41 +115,42 @@ class ChainSystem(StaticSystem):
         mujoco.mj_passive(model, data)
         mujoco.mj_rne(model, data, 0, bias)
         total += data.qfrc_passive - bias
-        for load in self.loads:
-            self._add_wrench(load.point, load.force, load.moment, total)
+        for point, load in self.loads:
+            self._add_wrench(point, load.force, load.moment, total)
         row = 0
-        for hold in self.holds:
-            moment = np.zeros(3) if hold.frame is None else multipliers[row + 3 : row + 6]
-            self._add_wrench(hold.point, multipliers[row : row + 3], moment, total)
-            row += 3 if hold.frame is None else 6
+        for point, item in self.holds:
+            clamped = item.hold.fixes_tangent
+            moment = multipliers[row + 3 : row + 6] if clamped else np.zeros(3)
+            self._add_wrench(point, multipliers[row : row + 3], moment, total)
+            row += 6 if clamped else 3
         return self._spread(total)
 
     def errors(self) -> Array:
         """The hold errors c here (c,): metres and, for clamps, radians, in the world frame."""
         parts = [np.zeros(0)]
-        for hold in self.holds:
-            parts.append(self._world(hold.point) - hold.position)
-            if hold.frame is not None:
-                now = self.data.xquat[hold.point.body]
-                parts.append(rotation_vector(multiply(now, conjugate(hold.frame))))
+        for point, item in self.holds:
+            parts.append(self._world(point) - item.position)
+            if item.hold.fixes_tangent:
+                now = self.data.xquat[point.body]
+                parts.append(rotation_vector(multiply(now, conjugate(item.frame))))
         return np.concatenate(parts)
 
     def constraints(self) -> Array:
         """Their Jacobian J here (c, n)."""
         rows = [np.zeros((0, self.n_unknowns))]
-        for hold in self.holds:
+        for point, item in self.holds:
             linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-            point = self._world(hold.point)
-            mujoco.mj_jac(self.model, self.data, linear, angular, point, hold.point.body)
+            place = self._world(point)
+            mujoco.mj_jac(self.model, self.data, linear, angular, place, point.body)
             rows.extend(self._spread(row)[None] for row in linear)
-            if hold.frame is not None:
+            if item.hold.fixes_tangent:
                 rows.extend(self._spread(row)[None] for row in angular)
         return np.concatenate(rows)
 
     def idle_motions(self) -> Array:
         """Rows (k, n) of the spins about tangents that nothing resists in a hose without GJ."""
         tangents = self.data.xmat[self.chain.bodies].reshape(-1, 3, 3)[:, :, 0]
-        held = {hold.point.body for hold in self.holds if hold.frame is not None}
+        held = {point.body for point, item in self.holds if item.hold.fixes_tangent}
         rows = np.zeros((len(tangents), self._freedoms.shape[1]))
         for k, body in enumerate(self.chain.bodies):
             if self.chain.kind.stiffness[0] == 0.0 and body not in held:

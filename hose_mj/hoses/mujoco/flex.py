@@ -15,15 +15,15 @@ from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion, interpolate
 from hose_mj.hoses.mujoco.flex_rod import BALLAST, FlexSettings, add_connect, make_rod, name_hold
 from hose_mj.hoses.mujoco.flex_statics import FlexProblem, FlexSystem, spread_loads
 from hose_mj.hoses.mujoco.hose import MujocoHose
-from hose_mj.hoses.mujoco.model import Motion, MujocoModel
-from hose_mj.hoses.mujoco.statics import linearize, solve_equilibrium
-from hose_mj.hoses.protocol import Array, Energies, Linearization, Momentum, Reaction
+from hose_mj.hoses.mujoco.model import MujocoModel
+from hose_mj.hoses.mujoco.statics import solve_equilibrium
+from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 _ADVICE = "try a smaller timestep, or softer edges and holds"
 
 
-class FlexModel(MujocoModel):
+class FlexModel(MujocoModel[FlexMotion]):
     """A compiled flex rod with its holds.
 
     Each vertex is a body on three slides; it is laid out along x from the world's origin, because
@@ -36,8 +36,10 @@ class FlexModel(MujocoModel):
 
     Attributes:
         layout: arc lengths of the vertices.
-        masses: of the vertices (N + 1,), kg.
+        mass: of the vertices (N + 1,), kg.
     """
+
+    layout: FlexLayout
 
     def __init__(self, spec: HoseSpec, settings: FlexSettings, held: Sequence[Held]) -> None:
         holds = [item.hold for item in held]
@@ -45,11 +47,11 @@ class FlexModel(MujocoModel):
         self.layout = FlexLayout.of_holds(
             spec.length, settings.segments, holds, clamp_correction=correct
         )
-        self.masses = self.layout.compute_masses(spec.linear_density)
-        self._bending_stiffness = spec.bending_stiffness
-        self._rest = np.zeros((len(self.masses), 3))
+        self.mass = self.layout.compute_masses(spec.linear_density)
+        self.stiffness = spec.bending_stiffness
+        self._rest = np.zeros((len(self.mass), 3))
         self._rest[:, 0] = self.layout.nodes
-        maker = make_rod(spec, self._rest, self.masses, settings.edge_options())
+        maker = make_rod(spec, self._rest, self.mass, settings.edge_options())
         settings.apply(maker.option)
         self._ballast = BALLAST * spec.mass
         for item in held:
@@ -57,15 +59,9 @@ class FlexModel(MujocoModel):
                 add_connect(maker, item, vertex, self._ballast, settings.hold_options())
         super().__init__(maker.compile(), settings.lead, _ADVICE)
         self._scratch = mujoco.MjData(self.model)
-        self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.masses))])
+        self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.mass))])
         self._free = self._find_free_edges(held)
-        self._motion: FlexMotion | None = None
         self._tensions = np.zeros(len(self.layout.edges))
-
-    @property
-    def nodes(self) -> Array:
-        """Rest arc lengths of the vertices (N + 1,), m."""
-        return self.layout.nodes
 
     # State.
 
@@ -84,30 +80,21 @@ class FlexModel(MujocoModel):
             edge = np.arange(len(chords))
             rows[edge, edge], rows[edge, edge + 1] = -chords, chords
             flat = rows.reshape(len(chords), -1)
-            lighter = flat / np.repeat(self.masses, 3)
+            lighter = flat / np.repeat(self.mass, 3)
             impulse = np.linalg.solve(flat @ lighter.T, flat @ speeds.ravel())
             velocities = speeds - (impulse @ lighter).reshape(-1, 3)
         self._set_state(vertices, velocities)
 
-    def take_over(self, old: Motion, held: Sequence[Held]) -> None:
+    def take_over(self, old: FlexMotion, held: Sequence[Held]) -> None:
         """Lays the rod where another one is; to the bit where its vertices are the same."""
-        assert isinstance(old, FlexMotion)
         if np.array_equal(old.layout.nodes, self.layout.nodes):
             self._set_state(old.vertices, old.velocities)
         else:
             self.lay(old.position(self.layout.nodes), old.velocity(self.layout.nodes))
 
-    def motion(self) -> FlexMotion:
-        """How the rod lies and moves now."""
-        if self._motion is None:
-            vertices = self._rest + self.data.qpos.reshape(-1, 3)
-            self._motion = FlexMotion(self.layout, vertices, self.data.qvel.reshape(-1, 3).copy())
-        return self._motion
-
-    def forget(self) -> None:
-        """Drops what was computed for an earlier state."""
-        super().forget()
-        self._motion = None
+    def _read_motion(self) -> FlexMotion:
+        vertices = self._rest + self.data.qpos.reshape(-1, 3)
+        return FlexMotion(self.layout, vertices, self.data.qvel.reshape(-1, 3).copy())
 
     def _set_state(self, vertices: Array, velocities: Array) -> None:
         self.data.qpos[:] = (vertices - self._rest).ravel()
@@ -142,15 +129,6 @@ class FlexModel(MujocoModel):
     def torque(self, arc_lengths: Array) -> Array:
         """Zero: nothing twists."""
         return np.zeros(len(arc_lengths))
-
-    def energies(self) -> Energies:
-        """Energies at the present state; `stretching` is 0, edges being constraints."""
-        gravity = self.model.opt.gravity
-        return self.motion().energies(self.masses, self._bending_stiffness, gravity)
-
-    def momentum(self) -> Momentum:
-        """Linear and angular momentum at the present state."""
-        return self.motion().momentum(self.masses)
 
     def write_targets(self, held: Sequence[Held], lead: float = 0.0) -> None:
         """Sets the bodies that hold vertices, `lead` steps ahead of where they are to be."""
@@ -195,18 +173,14 @@ class FlexModel(MujocoModel):
         self.keep_settled(np.concatenate(wrenches), held)
         self._tensions, self._forces_known = -multipliers[:count], True
 
-    def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
-        """Small motions about the present pose; edges are among the constraints."""
-        return linearize(self._static_system(held, loads))
-
     def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> FlexSystem:
         vertices = [self.layout.find_vertices(item.hold) for item in held]
         targets = [self._find_targets(item, 0.0) for item in held]
         problem = FlexProblem(
             self.layout,
-            self.masses,
+            self.mass,
             np.array(self.model.opt.gravity),
-            self._bending_stiffness,
+            self.stiffness,
             self._compute_bending,
             np.concatenate([np.zeros(0, dtype=np.int64), *vertices]),
             np.concatenate([np.zeros((0, 3)), *targets]),
@@ -287,6 +261,8 @@ class FlexHose(MujocoHose):
     """
 
     _model: FlexModel
+    layout: FlexLayout
+    settings: FlexSettings
 
     def __init__(
         self,
@@ -320,16 +296,6 @@ class FlexHose(MujocoHose):
             edge_solimp=edge_solimp,
         )
         super().__init__(spec, np.array([1.0, 0.0, 0.0]))
-
-    @property
-    def timestep(self) -> float:
-        """Length of one step (s)."""
-        return self.settings.timestep
-
-    @property
-    def layout(self) -> FlexLayout:
-        """Arc lengths of the vertices; another one after each change of holds."""
-        return self._model.layout
 
     def stretch(self) -> Array:
         """Strain of the edges (N,); 0 if MuJoCo's constraints were rigid."""

@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_choice
+from hose_mj.errors import InputError, check_choice
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
 from hose_mj.hoses.mujoco.chain_layout import (
     ChainKind,

@@ -26,17 +26,59 @@ from hose_mj.hoses.inputs import (
 )
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
 from hose_mj.hoses.mujoco.chain_layout import exponential, multiply, rotation_matrix, turn_frame
+from hose_mj.hoses.mujoco.chain_motion import ChainMotion
+from hose_mj.hoses.mujoco.chain_settings import ChainSettings
+from hose_mj.hoses.mujoco.flex_layout import FlexMotion
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.protocol import Array, Curve, Energies, Hold, Linearization, Momentum, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 
-class MujocoQueries(ABC):
-    """The queries of `HoseModel`, on a compiled model and the loads that act on it."""
+class MujocoHose(ABC):
+    """The `HoseModel` protocol on top of a `MujocoModel`.
 
-    spec: HoseSpec
-    _model: MujocoModel
+    Args:
+        spec: what the hose is made of.
+        straight: direction (3,) in which it lies at first.
+
+    Attributes:
+        fallbacks: always 0; hoses with a solver of their own count here.
+        settings: numerics.
+    """
+
+    settings: ChainSettings
+    _model: MujocoModel[ChainMotion] | MujocoModel[FlexMotion]
     _loads: list[Load]
+
+    def __init__(self, spec: HoseSpec, straight: Array) -> None:
+        self.spec, self.fallbacks = spec, 0
+        self._next_number = 0
+        self.reset(lambda s: s[:, None] * straight)
+
+    @abstractmethod
+    def _make_model(self, held: Sequence[Held]) -> MujocoModel[Any]:
+        """Compiles the hose with these holds.
+
+        Raises:
+            InputError: holds that are too close to each other.
+        """
+
+    @property
+    def timestep(self) -> float:
+        """Length of one step (s)."""
+        return self.settings.timestep
+
+    @property
+    def layout(self) -> Any:
+        """Arc lengths of the nodes; another one after each change of holds."""
+        return self._model.layout
+
+    @property
+    def twists(self) -> bool:
+        """Whether the hose can turn about its tangent against itself."""
+        return False
+
+    # Queries.
 
     @property
     def time(self) -> float:
@@ -96,52 +138,17 @@ class MujocoQueries(ABC):
     def _arc_lengths(self, arc_length: ArrayLike) -> Array:
         return check_arc_lengths(arc_length, self.spec.length)
 
-
-class MujocoHose(MujocoQueries):
-    """The `HoseModel` protocol on top of a `MujocoModel`.
-
-    Args:
-        spec: what the hose is made of.
-        straight: direction (3,) in which it lies at first.
-
-    Attributes:
-        fallbacks: always 0; hoses with a solver of their own count here.
-    """
-
-    def __init__(self, spec: HoseSpec, straight: Array) -> None:
-        self.spec, self.fallbacks = spec, 0
-        self._next_number = 0
-        self.reset(lambda s: s[:, None] * straight)
-
-    @abstractmethod
-    def _make_model(self, held: Sequence[Held]) -> MujocoModel:
-        """Compiles the hose with these holds.
-
-        Raises:
-            InputError: holds that are too close to each other.
-        """
-
-    @property
-    @abstractmethod
-    def timestep(self) -> float:
-        """Length of one step (s)."""
-
-    @property
-    def twists(self) -> bool:
-        """Whether the hose can turn about its tangent against itself."""
-        return False
-
     # Shape, holds and loads.
 
     def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
         """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads."""
         made = self._make_model([])
-        points = sample_curve(curve, self.spec.length, made.nodes)
+        points = sample_curve(curve, self.spec.length, made.layout.nodes)
         check_curve_points(points)
         points = self._check_points("curve", points)
         speeds = None
         if velocity is not None:
-            speeds = sample_velocity(velocity, self.spec.length, made.nodes)
+            speeds = sample_velocity(velocity, self.spec.length, made.layout.nodes)
         made.lay(points, speeds)
         self._model, self._held, self._loads = made, list[Held](), list[Load]()
 

@@ -26,7 +26,7 @@ from hose_learning.learner import Made
 from hose_learning.presets import make_modules
 from hose_learning.records import Memory
 from hose_learning.settings import LearnerSettings
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.plugins import find_plugins, load_plugin
 from hose_mj.tasks.task import Task
 
@@ -228,8 +228,7 @@ def make_settings(
         settings = {"modules": modules, **settings}
     known = [f.name for f in dataclasses.fields(LearnerSettings)]
     for name in settings:
-        if name not in known:
-            raise InputError("setting", name, "one of " + ", ".join(known))
+        check_choice("setting", name, known)
     return LearnerSettings(**{**entry.settings, **settings})
 
 

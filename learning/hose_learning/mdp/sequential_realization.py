@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from hose_learning.mdp.explicit_mdp import describe_state
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import enumerate_joint, enumerate_turns
 from hose_mj.tasks.kernels import HEADER, TURN, Floats, Integers
@@ -105,8 +105,7 @@ def study_sequential(
     """
     if task.schedule != "turns":
         raise InputError("task", task.id, "one whose agents move in turn")
-    if idle not in task.action_names:
-        raise InputError("idle action", idle, "one of " + ", ".join(task.action_names))
+    check_choice("idle action", idle, task.action_names)
     states = _list_states(task, list(starts), limit)
     nothing = task.action_names.index(idle)
     found: dict[int, list[tuple[Integers, int, int]]] = {number: [] for number in PROPERTIES}

@@ -19,7 +19,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 from hose_learning.experience import Bools
 from hose_learning.prediction.cross_validation import Classifier
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Floats, Integers
 
 ClusterRule = Literal["matched", "majority"]
@@ -281,6 +281,5 @@ def make_classifier(id: str, setup: Setup) -> Classifier:
     Raises:
         InputError: an unknown id.
     """
-    if id not in CLASSIFIERS:
-        raise InputError("classifier", id, "one of " + ", ".join(CLASSIFIERS))
+    check_choice("classifier", id, CLASSIFIERS)
     return CLASSIFIERS[id].make(setup)

@@ -257,14 +257,10 @@ def make_tables(
     obstacles: tuple[Ints, NDArray[np.bool_]],
     arcs: Array,
 ) -> Tables:
-    """Makes the tables; see `Tables`.
+    """Makes the tables of a world that is to be measured against limits; see `Tables`.
 
-    Args:
-        world: to be measured.
-        limits: what its margins are measured against.
-        footprints: of its robots.
-        obstacles: as `find_obstacles` returns them.
-        arcs: ends of the pieces of its centre line (K + 1,), m.
+    `obstacles` are as `find_obstacles` returns them, `arcs` the ends of the centre line's pieces (K
+    + 1,), m.
     """
     n, spec = world.n_robots, world.scene.spec
     geoms, may_hit = obstacles
@@ -319,14 +315,10 @@ def find_watched(world: World, obstacles: Ints) -> Watched:
 
 
 def split_hose(arcs: Array, attachments: Array) -> tuple[Ints, Array]:
-    """Cuts the hose at the ends of pieces and at the attachments.
+    """Cuts the hose at the ends of pieces (K + 1,) and at the attachments, tip first (N + 1,), m.
 
-    Args:
-        arcs: ends of the pieces (K + 1,), m.
-        attachments: of robots, tip first, and source (N + 1,), m.
-
-    Returns:
-        piece and segment (P, 2), and where each part begins and ends within its piece (P, 2).
+    Returned are piece and segment (P, 2), and where each part begins and ends within its piece (P,
+    2).
     """
     cuts = np.unique(np.concatenate([arcs, attachments]))
     cuts = cuts[cuts <= attachments[0]]
@@ -341,10 +333,8 @@ def place_samples(arcs: Array, attachments: Array) -> tuple[Array, Ints]:
     """Chooses arc lengths between which every model's tension is a straight line.
 
     Tension is known at the joints of a cable, the middles of a flex's edges and of a spline's
-    spans: ends and middles of pieces, and just inside the ends of the segments.
-
-    Returns:
-        arc lengths (T,), m, and the segment of each (T,).
+    spans: ends and middles of pieces, and just inside the ends of the segments. Returned are arc
+    lengths (T,), m, and the segment of each (T,).
     """
     known = np.concatenate([arcs, 0.5 * (arcs[:-1] + arcs[1:])])
     inside = [

@@ -49,8 +49,7 @@ class DmEnv(dm_env.Environment):
     def step(self, action: Any) -> dm_env.TimeStep:
         """Lets all agents move, or starts an episode where none runs.
 
-        Raises:
-            InputError: an action out of range.
+        `InputError` is raised for an action out of range.
         """
         if not self.env.episode.is_running:
             return self.reset()

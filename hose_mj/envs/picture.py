@@ -142,11 +142,9 @@ _FINE = 2  # drawn so many times larger
 
 
 def draw_picture(picture: Picture, cell: int | None = None) -> NDArray[np.uint8]:
-    """Returns the image of a picture, (height, width, 3).
+    """Returns the image of a picture, (height, width, 3); by default about 500 pixels wide.
 
-    Args:
-        picture: what is to be drawn.
-        cell: side of a cell (pixels); None for a grid about 500 pixels wide.
+    `cell` is the side of a cell (pixels).
     """
     if cell is None:
         cell = min(max(_WIDTH // picture.columns, 8), 96)

@@ -350,9 +350,8 @@ class Capture:
     def finish(self, outcome: Any = None) -> None:
         """Ends the episode.
 
-        Args:
-            outcome: has `ended_by`, a text, and `broken`, a `Break` or None; None if the episode
-                was stopped.
+        `outcome` has `ended_by`, a text, and `broken`, a `Break` or None; it is None if the episode
+        was stopped.
         """
         if self.scene is None or self._outcome is not None:
             return

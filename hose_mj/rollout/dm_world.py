@@ -79,11 +79,7 @@ class WorldPhysics(dm_mujoco.Physics):
         self._show()
 
     def reset(self, keyframe_id: int | None = None) -> None:
-        """Returns to the start of the scene; it has no other start.
-
-        Raises:
-            InputError: a keyframe.
-        """
+        """Returns to the start of the scene, the only one; `InputError` for a keyframe."""
         if keyframe_id is not None:
             raise InputError(
                 "keyframe_id", keyframe_id, "None: a world starts where its scene does"

@@ -161,11 +161,7 @@ POLICIES = ("random", "to-goal", *(f"break-{kind.name}" for kind in _BREAKABLE))
 
 
 def make_policy(name: str) -> Policy:
-    """Returns a policy by name.
-
-    Raises:
-        InputError: an unknown name.
-    """
+    """Returns a policy by name; `InputError` for an unknown name."""
     check_choice("policy", name, POLICIES)
     if name == "random":
         return Random()

@@ -52,13 +52,9 @@ def relax(formation: Array, fixed: int, source: Array, spans: Array) -> Array:
     """Draws robots together until no two neighbours, the source included, are too far apart.
 
     Passes up and down the hose alternate, as in Aristidou and Lasenby's FABRIK (2011), but with
-    lengths that are limits: they end at such a formation where there is one.
-
-    Args:
-        formation: places of the sites (N, 3), m.
-        fixed: the robot that stays.
-        source: where the hose begins (3,), m.
-        spans: how far each robot may be from the next one along the hose (N,), m.
+    lengths that are limits: they end at such a formation where there is one. The sites are at (N,
+    3), m, the robot `fixed` stays; `spans` are how far each may be from the next one along the hose
+    (N,), m.
     """
     chain = np.concatenate([formation, source[None]])
     n = len(formation)

@@ -90,11 +90,8 @@ def apply(record: Any, state: Integers, agent: int, action: int) -> int:
 def apply_joint(record: Any, state: Integers, actions: Integers, caused_events: Integers) -> int:
     """Lets all agents move at once and returns all events.
 
-    Args:
-        record: the task's kernel record.
-        state: advanced in place; the turn goes back to agent 0.
-        actions: one for each agent (n_agents,).
-        caused_events: the events that each agent caused (n_agents,), written in place.
+    The state is advanced in place, the turn goes back to agent 0. There is an action for each agent
+    (n_agents,); the events that each caused are written to `caused_events` (n_agents,).
     """
     raise NotImplementedError(type(record).__name__)
 
@@ -227,13 +224,9 @@ def run_random(
 ) -> None:
     """Plays random moves, agents in turn, observing before each one; for timing and tests.
 
-    Args:
-        record: the task's kernel record.
-        state: an initial state, advanced in place through as many episodes as it takes.
-        stream: random numbers for the actions and the resets.
-        n_moves: number of moves.
-        values: work array of the observed values (n_variables,).
-        counts: raised in place: episodes ended, successes, violations, sum of all values (4,).
+    The state, an initial one, is advanced through as many episodes as it takes. `values` is a work
+    array (n_variables,); `counts` are raised: episodes ended, successes, violations, sum of all
+    values (4,).
     """
     episodes = successes = violations = total = 0
     for _ in range(n_moves):

@@ -137,15 +137,10 @@ def compute_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffne
     """Largest stable step (s) of a free chain of rigid links with explicit joint stiffness.
 
     Undamped, 2 / omega for the fastest motion of bending or twist (docs/mujoco_cable.md, "Time
-    step"). Damping taken implicitly, with a relaxation time T, bears
-    dt = T + sqrt(T^2 + (2 / omega)^2): Jury's condition for v' = (v - dt omega^2 x) /
-    (1 + dt omega^2 T), x' = x + dt v'. A ball joint has one damping, tau EI / h, so of the twist
-    T is tau EI / GJ.
-
-    Args:
-        spec: the hose.
-        segment_length: h (m).
-        torsional_stiffness: GJ (N m^2).
+    step"), by h (m), EI and GJ (N m^2). Damping taken implicitly, with a relaxation time T, bears
+    dt = T + sqrt(T^2 + (2 / omega)^2): Jury's condition for v' = (v - dt omega^2 x) / (1 + dt
+    omega^2 T), x' = x + dt v'. A ball joint has one damping, tau EI / h, so of the twist T is tau
+    EI / GJ.
     """
     h, density, stiffness = segment_length, spec.linear_density, spec.bending_stiffness
     bend = h**2 / (2.0 * math.sqrt(3.0)) * math.sqrt(density / stiffness)

@@ -88,13 +88,9 @@ class Driver:
         self._servos = tuple(servos)
 
     def drive_to(self, targets: ArrayLike) -> None:
-        """Sets where the robots' sites are to be.
+        """Sets where the robots' sites are to be (N, 3), m; one driven in the plane ignores z.
 
-        Args:
-            targets: (N, 3), m; a robot driven in the plane ignores z.
-
-        Raises:
-            InputError: another shape, or numbers that are not finite.
+        `InputError` is raised for another shape, or numbers that are not finite.
         """
         try:
             wanted = np.asarray(targets, dtype=np.float64)

@@ -107,10 +107,8 @@ class MujocoWorld(World):
     ) -> mujoco.MjSpec:
         """A model of the hose alone, with sites hold0, hold1, ... for robots and source.
 
-        Args:
-            spec: the hose.
-            contact: how it touches the scene.
-            ties: solref and solimp of equality constraints.
+        `contact` says how it touches the scene; `ties` are solref and solimp of equality
+        constraints.
         """
 
     def _finish_model(self, spec: HoseSpec, model: mujoco.MjModel) -> None:
@@ -250,16 +248,10 @@ class Pin:
 
 
 def fit_curve(curve: Array, nodes: Array, arc_lengths: Array, places: Array) -> Array:
-    """Returns a chain along a curve.
+    """Returns a chain, nodes (K + 1, 3), m, along a curve; see `fit_chain`.
 
-    Args:
-        curve: points even in arc length from 0 to L (n, 3), m.
-        nodes: arc lengths of the chain's nodes, rising from 0 to L, (K + 1,), m.
-        arc_lengths: of what holds it (k,), m.
-        places: where that is (k, 3), m.
-
-    Returns:
-        nodes (K + 1, 3), m, near the curve; see `fit_chain`.
+    The curve's points (n, 3), m, are even in arc length from 0 to L, the chain's nodes at arc
+    lengths (K + 1,), m. It is held at `arc_lengths` (k,), m, in `places` (k, 3), m.
     """
     even, lengths = np.linspace(0.0, nodes[-1], len(curve)), np.diff(nodes)
     points = np.stack([np.interp(nodes, even, curve[:, c]) for c in range(3)], axis=1)
@@ -270,18 +262,10 @@ def fit_curve(curve: Array, nodes: Array, arc_lengths: Array, places: Array) -> 
 
 
 def fit_chain(points: Array, lengths: Array, pins: list[Pin]) -> Array:
-    """Returns nodes near `points` whose distances are `lengths` and that meet the pins.
+    """Returns nodes (N + 1, 3), m, near `points` at distances `lengths` (N,) that meet the pins.
 
     Newton's method on these equations, each step the smallest that solves their linear form. What
     cannot be met (pins further apart than the chain is long) is left as it is after so many rounds.
-
-    Args:
-        points: (N + 1, 3), m.
-        lengths: (N,), m.
-        pins: what holds the chain.
-
-    Returns:
-        nodes (N + 1, 3), m.
     """
     nodes = points.copy()
     count = len(lengths)

@@ -82,15 +82,9 @@ class Experience:
 def record_experience(task: Task, n_moves: int, generator: np.random.Generator) -> Experience:
     """Plays random available actions (epsilon = 1), agents in turn, and logs every move.
 
-    An episode that ends, or reaches the task's step limit, is followed by another one.
-
-    Args:
-        task: compiled or in plain Python.
-        n_moves: moves of single agents.
-        generator: of the actions and the initial states.
-
-    Raises:
-        InputError: fewer than one move.
+    An episode that ends, or reaches the task's step limit, is followed by another one. The task may
+    be compiled or in plain Python; `n_moves` are moves of single agents, and `InputError` is raised
+    for fewer than one. The generator seeds actions and initial states.
     """
     if n_moves < 1:
         raise InputError("n_moves", n_moves, "a whole number, at least 1")
@@ -138,11 +132,7 @@ def write_experience(path: Path, experience: Experience) -> None:
 
 
 def read_experience(path: Path) -> Experience:
-    """Reads a log.
-
-    Raises:
-        InputError: no such file, or one that `write_experience` did not write.
-    """
+    """Reads a log; `InputError` for what `write_experience` did not write."""
     valid = "a file written by write_experience"
     try:
         with np.load(path, allow_pickle=False) as archive:

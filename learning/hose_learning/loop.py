@@ -143,18 +143,10 @@ def count_events(task: Any, learner: Learner, memory: Memory, events: int) -> No
 def run_turns(
     task: Any, learner: Learner, memory: Memory, log: Log, max_moves: int, max_episodes: int
 ) -> int:
-    """Trains agents that move one after the other.
+    """Trains agents that move one after the other; returns the number of moves.
 
-    Args:
-        task: the task's kernel record.
-        learner: the learner.
-        memory: its memory, changed in place.
-        log: filled in place, one row for each episode that ends.
-        max_moves: most moves of single agents.
-        max_episodes: most episodes to end.
-
-    Returns:
-        The number of moves.
+    The memory is changed in place, and the log gets a row for each episode that ends. It ends after
+    that many moves of single agents or episodes, or where there is no more room.
     """
     last_episode = memory.counters[EPISODES] + max_episodes
     moves = 0
@@ -268,13 +260,10 @@ class Rows(NamedTuple):
 
 @compiled
 def fill_rows(record: Any, state: Integers, stream: Stream, rows: Rows) -> None:
-    """Plays random available actions, agents in turn, until all rows are written.
+    """Plays random available actions, agents in turn, until all rows are written in place.
 
-    Args:
-        record: the task's kernel record.
-        state: an initial state, advanced in place through as many episodes as it takes.
-        stream: random numbers for the actions and the resets.
-        rows: written in place.
+    The state, an initial one, is advanced through as many episodes as it takes; the stream decides
+    actions and resets.
     """
     for k in range(rows.agents.shape[0]):
         agent = state[TURN]

@@ -75,13 +75,8 @@ class Arrays:
 def make_arrays(task: Task, modules: Sequence[Module], n_parts: int) -> Arrays:
     """Lays the states that the modules of one kind see one after the other.
 
-    Args:
-        task: the task.
-        modules: the modules.
-        n_parts: how many parts each has: one for each agent, or one for a team.
-
-    Raises:
-        InputError: an unknown variable, or more than 2^62 keys in all.
+    Each has `n_parts`: one for each agent, or one for a team. `InputError` is raised for an unknown
+    variable, or more than 2^62 keys in all.
     """
     projections = [task.make_projection(module.variables) for module in modules]
     width = max([1, *(len(p.columns) for p in projections)])
@@ -127,14 +122,8 @@ def make_module_rewards(task: Task, modules: Sequence[Module]) -> Floats:
 def make_masks(thing: str, names: Sequence[str], chosen: Sequence[Sequence[str]]) -> Integers:
     """Returns some names of each module as bits of one integer (n_modules,).
 
-    Args:
-        thing: what is named, for the message: an "event" that a veto module answers to, or an
-            "action" that it is about.
-        names: all of them; bit k stands for the k-th.
-        chosen: those of each module.
-
-    Raises:
-        InputError: an unknown name.
+    Bit k stands for the k-th of all `names`. `thing` is what they name, for the `InputError` that
+    an unknown one raises.
     """
     masks = np.zeros(len(chosen), np.int64)
     for place, name in ((place, name) for place, own in enumerate(chosen) for name in own):

@@ -66,16 +66,10 @@ def find_parts(task: Task) -> Parts:
 def make_modules(
     task: Task, values: str, vetoes: str, threshold: float = VETO_THRESHOLD
 ) -> tuple[Module, ...]:
-    """Makes modules for a task.
+    """Makes modules for a task, by names of `VALUES` and `VETOES`.
 
-    Args:
-        task: the task.
-        values: one of `VALUES`.
-        vetoes: one of `VETOES`.
-        threshold: of the modules of "thresholds".
-
-    Raises:
-        InputError: an unknown choice.
+    The threshold is that of the modules of "thresholds". `InputError` is raised for an unknown
+    choice.
     """
     check_choice("values", values, VALUES)
     check_choice("vetoes", vetoes, VETOES)

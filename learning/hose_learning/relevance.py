@@ -95,16 +95,11 @@ def sort_by_range(values: Integers) -> list[int]:
 
 
 def find_relevant(values: Integers, moves: Integers, signal: Bools) -> Bools:
-    """Runs Algorithm 5.1 for one signal.
+    """Runs Algorithm 5.1 for one signal; returns whether each variable matters (n_variables,).
 
-    Args:
-        values: of the variables, before each move (n, n_variables).
-        moves: what two rows must have in common to be compared: the action, and who acted where
-            agents are told apart (n,).
-        signal: whether the move caused it (n,).
-
-    Returns:
-        Whether each variable matters (n_variables,).
+    `values` are those before each move (n, n_variables), `moves` what two rows must have in common
+    to be compared: the action, and who acted where agents are told apart (n,). `signal` says
+    whether the move caused it (n,).
     """
     kept = sort_by_range(values)
     for variable in list(kept):

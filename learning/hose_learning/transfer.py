@@ -189,11 +189,8 @@ def match_modules(source: Training, target: Training) -> list[Match]:
 def carry(source: Table, target: Table, image: Image, parts: Iterable[tuple[int, int]]) -> Table:
     """Copies the written rows of one module; returns the target's table, grown where it must be.
 
-    Args:
-        source: the source's table.
-        target: the target's, written in place where it has room.
-        image: where keys go.
-        parts: first key of each agent in the source and in the target.
+    `image` says where keys go, `parts` the first key of each agent in the source and in the target,
+    which is written in place where it has room.
     """
     keys, places = list_written(source)
     for base, other_base in parts:

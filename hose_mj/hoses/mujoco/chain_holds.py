@@ -108,14 +108,8 @@ def add_equality(
 ) -> None:
     """Ties a point of a segment to a mocap body: a weld for a clamp, else a connect.
 
-    A weld also holds the twist of the segment, which the tangent alone would leave free.
-
-    Args:
-        spec: model that is being made.
-        body: the segment.
-        along: distance of the point from the segment's first node (m).
-        held: what holds it.
-        options: solref and solimp of the constraint.
+    A weld also holds the twist of the segment, which the tangent alone would leave free. The point
+    is `along` from the segment's first node (m); `options` are solref and solimp of the constraint.
     """
     number = held.hold.number
     body.add_site(name=f"held{number}", pos=[along, 0, 0])

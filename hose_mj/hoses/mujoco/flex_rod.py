@@ -50,13 +50,8 @@ def make_rod(
     """Vertices on slides, MuJoCo's bending between them, edges that keep their lengths.
 
     MuJoCo multiplies `young` by the section of a solid cylinder of the flex's radius; `damping` is
-    the Kelvin-Voigt time. Nothing collides.
-
-    Args:
-        spec: what the hose is made of.
-        rest: straight shape (N + 1, 3), m.
-        masses: of the vertices (N + 1,), kg.
-        edge_options: solref and solimp of the edges.
+    the Kelvin-Voigt time. Nothing collides. `rest` is the straight shape (N + 1, 3), m; masses are
+    (N + 1,), kg; `edge_options` are solref and solimp of the edges.
     """
     maker = mujoco.MjSpec()
     for k, (place, mass) in enumerate(zip(rest, masses, strict=True)):

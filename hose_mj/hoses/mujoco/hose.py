@@ -57,11 +57,7 @@ class MujocoHose(ABC):
 
     @abstractmethod
     def _make_model(self, held: Sequence[Held]) -> MujocoModel[Any]:
-        """Compiles the hose with these holds.
-
-        Raises:
-            InputError: holds that are too close to each other.
-        """
+        """Compiles the hose with these holds; `InputError` if they are too close to each other."""
 
     @property
     def timestep(self) -> float:

@@ -146,12 +146,8 @@ def compute_clocks(history: Floats, messages: Messages, increments: Floats) -> F
         xi_i <- xi_i - sum_j a_ij (xi_i - xi_j) + v_i h,   a_ij = 1/N if j was heard, else 0
 
     It is the equation's discrete form: what was heard is weighed once a round, and a message says
-    what its sender's clock showed when it left.
-
-    Args:
-        history: the clocks of this round and of those before, newest first (n_kept, N).
-        messages: what arrives.
-        increments: v_i h of each clock (N,).
+    what its sender's clock showed when it left. `history` has the clocks of this round and of those
+    before, newest first (n_kept, N); `increments` are v_i h (N,).
     """
     clocks = history[0]
     n_agents = len(clocks)
@@ -261,15 +257,12 @@ def compute_longest_action(lead: float, drift: float) -> float:
     """Returns the longest action that surely ends before the next one begins, in turns.
 
     The agent after the owner of turn t begins when its clock reaches t + 1, so not before any clock
-    does. The furthest that any has been grows by at most 1 + drift per unit of time (a mean of what
-    clocks show or showed puts none beyond it) until the owner itself, being done, gives the turn.
-    So an action is over in time if lead + (1 + drift) A <= 1.
+    does. The furthest that any has been is at most `lead` into a turn when its owner begins, and
+    grows by at most 1 + drift per unit of time (a mean of what clocks show or showed puts none
+    beyond it) until the owner itself, being done, gives the turn. So an action is over in time if
+    lead + (1 + drift) A <= 1.
 
     The thesis's v = 1/T, a turn as long as the longest action, leaves no room for any disagreement.
-
-    Args:
-        lead: how far any clock has got into a turn when its owner begins, at most.
-        drift: largest relative error of a clock's rate.
     """
     return (1.0 - lead) / (1.0 + drift)
 
@@ -299,15 +292,11 @@ def compute_speed(settings: ConsensusSettings) -> float:
 def compute_disagreement(settings: ConsensusSettings, rates: Floats, n_rounds: int = 400) -> float:
     """Returns the standard deviation of the clocks about their common mean, in turns.
 
-    It is the square root of E[sum_i (xi_i - mean)^2] / N after `n_rounds` rounds from equal clocks,
-    agents that act left aside; it settles within some tens of rounds. Without delay the value is
+    It is the square root of E[sum_i (xi_i - mean)^2] / N after `n_rounds` rounds from equal clocks
+    with rates v_i (N,), agents that act left aside; it settles within some tens of rounds. Without
+    delay the value is
 
         sqrt((1 + p) / ((1 - p) (1 - lambda))) h std(v_i).
-
-    Args:
-        settings: the network.
-        rates: v_i of the clocks (N,).
-        n_rounds: number of rounds.
     """
     n, kept = settings.n_agents, settings.delay + 1
     arrive = 1.0 - settings.loss

@@ -73,12 +73,7 @@ def run_trial(settings: ConsensusSettings, seed: int) -> ConsensusTrial:
 
 
 def draw_consensus(trials: Sequence[ConsensusTrial], own: ConsensusTrial) -> bytes:
-    """Returns the PNG: disagreement over time above, the actions of one trial below.
-
-    Args:
-        trials: one for each loss.
-        own: the one whose actions are drawn.
-    """
+    """Returns the PNG: disagreement of all trials over time above, the actions of one below."""
     n = own.settings.n_agents
     with make_figure((7.6, 5.6), f"{n} clocks agree on whose turn it is") as figure:
         above, below = figure.subplots(2, 1, height_ratios=(3, 2))

@@ -208,11 +208,8 @@ def make_scratch(graph: Graph, n_actions: int) -> Scratch:
 def maximize(graph: Graph, scratch: Scratch, allowed: Integers, stream: Stream) -> float:
     """Writes the best joint action found into `scratch.best` and returns its payoff.
 
-    Args:
-        graph: the graph.
-        scratch: payoffs and work arrays.
-        allowed: what each agent may do, as bits (n_agents,), none of them 0.
-        stream: random numbers for ties and starts.
+    `allowed` is what each agent may do, as bits (n_agents,), none of them 0. The stream decides
+    ties and starts.
     """
     if graph.solver == ELIMINATION:
         eliminate(graph, scratch, allowed, stream)

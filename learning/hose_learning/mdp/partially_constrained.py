@@ -212,14 +212,7 @@ class Propositions:
 def compute_propositions(
     source: MarkovModel, target: MarkovModel, projection: Integers, discount: float = 0.9
 ) -> Propositions:
-    """Measures Propositions 4 and 5 on a pair of tasks.
-
-    Args:
-        source: the source task.
-        target: the target task.
-        projection: [s] of each target state, none of them `ABSENT`.
-        discount: gamma.
-    """
+    """Measures Propositions 4 and 5 on a pair of tasks; `projection` has no `ABSENT` state."""
     safe = compute_safe_actions(target)
     unsafe_in_source = safe & ~compute_safe_actions(source)[projection]
     transferred = solve(source, discount)[projection]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
@@ -318,14 +311,8 @@ def write_pair(
 ) -> WrittenPair:
     """Writes two tasks out from one start, drawn for the target.
 
-    Args:
-        source: a task with the parts of the target's state, or fewer or shorter ones.
-        target: a task with the same agents and actions.
-        random: draws the start.
-        limit: largest number of states of a task.
-
-    Raises:
-        InputError: agents, actions or parts that differ, or more states than the limit.
+    The source has the same agents and actions and the parts of the target's state, or fewer or
+    shorter ones; `InputError` is raised if not, or for more states of a task than the limit.
     """
     for name, given, valid in (
         ("agents of the target", target.agents, source.agents),

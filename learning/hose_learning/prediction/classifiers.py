@@ -276,10 +276,6 @@ CLASSIFIERS: dict[str, ClassifierEntry] = {
 
 
 def make_classifier(id: str, setup: Setup) -> Classifier:
-    """Makes a classifier that has learned nothing.
-
-    Raises:
-        InputError: an unknown id.
-    """
+    """Makes a classifier that has learned nothing; `InputError` for an unknown id."""
     check_choice("classifier", id, CLASSIFIERS)
     return CLASSIFIERS[id].make(setup)

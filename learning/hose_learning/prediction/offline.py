@@ -166,12 +166,8 @@ class Study:
 def run_study(plan: OfflinePlan, on_fold: Callable[[], object] = lambda: None) -> Study:
     """Logs random moves, the step limit lifted, and cross-validates all classifiers on them.
 
-    Args:
-        plan: what is to be measured.
-        on_fold: called after each fold of each classifier.
-
-    Raises:
-        InputError: a task that does not exist, or too few undesired moves for the folds.
+    `on_fold` is called after each fold of each classifier. `InputError` is raised for a task that
+    does not exist, or too few undesired moves for the folds.
     """
     task = make_task(plan.task, step_limit=LIFTED)
     experiences, logs = [], []

@@ -173,12 +173,9 @@ class Nearest(NamedTuple):
 class HoseProbe:
     """Measures the hose against geoms, in a small mjModel of these and one capsule.
 
-    Args:
-        model: the world's.
-        geoms: for each robot the numbers of its geoms to be measured.
-        own: arc lengths between which a robot's own hose lies (N, 2), m.
-        radius: of the hose, m.
-        arcs: arc lengths at the ends of the centre line's pieces (K + 1,), m.
+    `geoms` are those of each robot that are to be measured, `own` the arc lengths between which its
+    own hose lies (N, 2), m; `radius` is the hose's (m), and `arcs` are the ends of the centre
+    line's pieces (K + 1,), m.
     """
 
     def __init__(

@@ -34,8 +34,7 @@ from hose_mj.recording.grid import Array, GridEpisode, GridTrack
 from hose_mj.tasks.kernels import STEPS, Integers
 from hose_mj.tasks.line.kernels import ABSENT, Line
 from hose_mj.tasks.task import Task
-from hose_mj.tasks.taxi.kernels import WIDTH, Taxi
-from hose_mj.tasks.taxi.settings import STATIONS
+from hose_mj.tasks.taxi.kernels import STATIONS, WIDTH, Taxi
 from hose_mj.tasks.tiny.kernels import Corridor, Maze
 
 RENDER_MODES = ["human", "ansi", "rgb_array", "rerun"]

@@ -47,13 +47,9 @@ _KINDS = {**KIND_NAMES, _ELLIPSOID: "ellipsoid", _MESH: "mesh"}
 class SceneBodies:
     """The scene's bodies among those of a world, where `cable` and `flex` hoses have theirs too.
 
-    Args:
-        world: at its start.
-
-    Attributes:
-        model: the scene's own mjModel, without a hose.
-        data: its poses, those of the world's bodies.
-        bodies: ids in the world's model of the scene's bodies that move and are seen (B,).
+    `model` is the scene's own mjModel, without a hose, `data` has the poses of the world's bodies
+    at its start, and `bodies` (B,) are the ids in the world's model of those that move and are
+    seen.
     """
 
     def __init__(self, world: World) -> None:
@@ -162,13 +158,9 @@ def read_control_points(world: World) -> Array:
 
 
 class HoseReader:
-    """Reads where the hose is, at the same arc lengths again and again.
+    """Reads where the hose is, at the same rising arc lengths (P,), m, again and again.
 
     A spline hose is linear in its control points: a product replaces the search of its basis.
-
-    Args:
-        world: whose hose it is.
-        arc_lengths: rising (P,), m.
     """
 
     def __init__(self, world: World, arc_lengths: Array) -> None:

@@ -9,8 +9,7 @@ from itertools import product
 import numpy as np
 
 from hose_mj.hoses.protocol import Array
-from hose_mj.rollout.obstacles import Obstacles, compute_reach
-from hose_mj.rollout.scripts import Script, relax
+from hose_mj.rollout.scripts import Obstacles, Script, compute_reach, relax
 from hose_mj.world.actions import compute_cells, compute_centres
 from hose_mj.world.driving import Driver
 
@@ -23,10 +22,8 @@ _CLEARANCE = 0.15
 class FreeCells:
     """The cells in which the tip's robot may be while nothing else moves.
 
-    Args:
-        driver: of the world.
-        start: where the tip's site starts (3,), m.
-        hose: whether cells that the hose covers are held, away from the tip's own place on it.
+    Its site starts at `start` (3,), m. With `hose`, cells that the hose covers are held, away from
+    the tip's own place on it.
     """
 
     def __init__(self, driver: Driver, start: Array, *, hose: bool) -> None:

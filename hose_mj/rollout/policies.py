@@ -196,12 +196,9 @@ class RehearsedScript:
 
 
 class Rehearsal:
-    """Plays scripts from the state that a world is in.
+    """Plays scripts from the state that a world is in, which is not changed but for its time.
 
-    Args:
-        world: not changed, but for the time that a trial takes.
-        monitor: of the world.
-        ends_at_goal: whether a trial is over when the tip is at the goal.
+    With `ends_at_goal` a trial is over when the tip is at the goal.
     """
 
     def __init__(self, world: World, monitor: Monitor, *, ends_at_goal: bool) -> None:

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
-from hose_mj.tasks.search import NOT_FOUND, TOO_MANY, search
+from hose_mj.tasks.kernels import NOT_FOUND, STEPS, TOO_MANY, TURN, Floats, Integers
 from hose_mj.tasks.task import Task
 
 OVER = -1
@@ -182,7 +181,7 @@ def find_shortest(task: Task, state: Integers, limit: int = 4_000_000) -> int | 
     width = len(state)
     slots = 1 << int(np.ceil(np.log2(2 * limit)))
     states = np.zeros((limit, width), np.int16)
-    moves = search(
+    moves = kernels.search(
         task.kernel, state.copy(), states, np.full(slots, -1, np.int32), np.zeros(width, np.int64)
     )
     if moves == TOO_MANY:

@@ -178,13 +178,10 @@ def add_probe(spec: mujoco.MjSpec) -> None:
 
 
 class GeomMeter:
-    """Measures points against some geoms of a model.
+    """Measures points against some geoms (M,) of a model that has the geom of `add_probe`.
 
-    Args:
-        model: with the geom of `add_probe`.
-        geoms: ids, (M,).
-        touched: whether each geom counts at each of the points, (M, Q).
-        reach: beyond this distance nothing is measured (m).
+    `touched` (M, Q) says whether each geom counts at each of the points; beyond `reach` (m) nothing
+    is measured.
     """
 
     def __init__(

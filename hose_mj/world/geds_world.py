@@ -250,12 +250,7 @@ _SKIPPED = int(mujoco.mjtStage.mjSTAGE_VEL)
 
 
 class Bodies:
-    """The bodies of one mjModel under MuJoCo's integrator implicitfast.
-
-    Args:
-        model, data: MuJoCo's.
-        sites: ids of the sites where forces act, (k,).
-    """
+    """The bodies of one mjModel under MuJoCo's implicitfast; forces act at the sites (k,)."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, sites: np.ndarray) -> None:
         self._model, self._data, self._sites = model, data, [int(site) for site in sites]

@@ -25,12 +25,7 @@ _ALIGNED = 1.0 - 1e-12
 class PlanarPointRobots:
     """The robots of a world in which nothing else moves, each a body on slides along world axes.
 
-    Args:
-        world: as it starts.
-        hose: of the world.
-        contact: of the hose with the scene.
-        axes: axis of the world that each degree of freedom goes along, (nv,).
-        signs: +1 or -1, whether it goes up or down that axis, (nv,).
+    Each degree of freedom goes along one of the `axes` (nv,), up or down by the `signs` (nv,).
     """
 
     def __init__(

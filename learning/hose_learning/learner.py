@@ -37,19 +37,12 @@ def make_learner(
     width: int | None = None,
     n_parts: int | None = None,
 ) -> Made:
-    """Makes a learner that has learned nothing, and its memory.
+    """Makes a learner that has learned nothing, and its memory; the generator seeds its chance.
 
-    Args:
-        task: the task it is for.
-        settings: its settings.
-        rule: record of its update rule.
-        generator: seeds the choices and the resets.
-        own: what the rule keeps beside the tables, a NamedTuple of arrays.
-        width: length of a row of Q-values; by default the number of actions.
-        n_parts: tables of each value module; by default one for each agent.
-
-    Raises:
-        InputError: a module names what the task does not have, or sees too much.
+    `rule` is the record of its update rule and `own` what that keeps beside the tables, a
+    NamedTuple of arrays. A row of Q-values is `width` long, by default the number of actions; each
+    value module has `n_parts` tables, by default one for each agent. `InputError` is raised for a
+    module that names what the task does not have, or sees too much.
     """
     values = settings.select("value")
     vetoes = settings.select("veto")

@@ -112,12 +112,7 @@ class CableHose(MujocoChainHose):
 
 
 class BallJoints(ChainKind):
-    """The composite cable's joints.
-
-    Args:
-        spec: what the hose is made of.
-        torsional_stiffness: GJ (N m^2).
-    """
+    """The composite cable's joints; `torsional_stiffness` is GJ (N m^2)."""
 
     def __init__(self, spec: HoseSpec, torsional_stiffness: float) -> None:
         self.spec = spec

@@ -27,14 +27,9 @@ from hose_mj.hoses.mujoco.chain_layout import (
 )
 from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings, add_obstacles
-from hose_mj.hoses.mujoco.chain_statics import (
-    BodyPoint,
-    ChainSystem,
-    StaticChain,
-)
 from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel
-from hose_mj.hoses.mujoco.statics import solve_equilibrium
+from hose_mj.hoses.mujoco.statics import BodyPoint, ChainSystem, StaticChain, solve_equilibrium
 from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
@@ -45,17 +40,9 @@ _ADVICE = (
 
 
 class ChainModel(MujocoModel[ChainMotion]):
-    """A compiled chain with its holds.
+    """A compiled chain with what holds it; a rigid hold holds the first segment.
 
-    Args:
-        kind: what the joints are.
-        spec: what the hose is made of.
-        settings: numerics.
-        held: what holds it; a rigid one holds the first segment.
-
-    Attributes:
-        layout: arc lengths of the nodes.
-        bodies: body ids of the segments (N,).
+    `bodies` (N,) are the body ids of the segments.
     """
 
     layout: ChainLayout

@@ -12,8 +12,16 @@ from hose_mj.hoses.mujoco.chain import check_plain
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, find_rows
 from hose_mj.hoses.mujoco.chain_layout import rotation_matrix
 from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion, interpolate
-from hose_mj.hoses.mujoco.flex_rod import BALLAST, FlexSettings, add_connect, make_rod, name_hold
-from hose_mj.hoses.mujoco.flex_statics import FlexProblem, FlexSystem, spread_loads
+from hose_mj.hoses.mujoco.flex_rod import (
+    BALLAST,
+    FlexProblem,
+    FlexSettings,
+    FlexSystem,
+    add_connect,
+    make_rod,
+    name_hold,
+    spread_loads,
+)
 from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.mujoco.statics import solve_equilibrium
@@ -27,16 +35,8 @@ class FlexModel(MujocoModel[FlexMotion]):
     """A compiled flex rod with its holds.
 
     Each vertex is a body on three slides; it is laid out along x from the world's origin, because
-    MuJoCo takes the shape at qpos = 0 for the one without bending.
-
-    Args:
-        spec: what the hose is made of.
-        settings: numerics.
-        held: what holds it.
-
-    Attributes:
-        layout: arc lengths of the vertices.
-        mass: of the vertices (N + 1,), kg.
+    MuJoCo takes the shape at qpos = 0 for the one without bending. `mass` is that of the vertices
+    (N + 1,), kg.
     """
 
     layout: FlexLayout

@@ -94,12 +94,7 @@ class HingeChainHose(MujocoChainHose):
 
 
 class HingeJoints(ChainKind):
-    """Hinges normal to a plane.
-
-    Args:
-        spec: what the hose is made of.
-        plane: a key of `PLANE_FRAMES`.
-    """
+    """Hinges normal to a plane, a key of `PLANE_FRAMES`."""
 
     def __init__(self, spec: HoseSpec, plane: str) -> None:
         self.spec, self.plane = spec, plane

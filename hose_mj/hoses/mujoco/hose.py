@@ -35,15 +35,9 @@ from hose_mj.hoses.spec import HoseSpec, check_number
 
 
 class MujocoHose(ABC):
-    """The `HoseModel` protocol on top of a `MujocoModel`.
+    """The `HoseModel` protocol on top of a `MujocoModel`; at first it lies along `straight` (3,).
 
-    Args:
-        spec: what the hose is made of.
-        straight: direction (3,) in which it lies at first.
-
-    Attributes:
-        fallbacks: always 0; hoses with a solver of their own count here.
-        settings: numerics.
+    `fallbacks` is always 0; hoses with a solver of their own count here.
     """
 
     settings: ChainSettings

@@ -33,10 +33,8 @@ Motion = TypeVar("Motion", ChainMotion, FlexMotion)
 class MujocoModel(ABC, Generic[Motion]):
     """A compiled mjModel of one hose and what holds it.
 
-    Args:
-        model: the mjModel.
-        lead: steps by which a moving target must run ahead for a hold to be in time.
-        advice: what to try where the model turns out unstable.
+    A moving target must run ahead by `lead` steps for a hold to be in time; `advice` says what to
+    try where the model turns out unstable.
 
     Attributes:
         layout: arc lengths of the nodes.

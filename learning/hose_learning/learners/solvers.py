@@ -76,18 +76,10 @@ def make_graph(
     rounds: int,
     eliminates: bool,
 ) -> Graph:
-    """Makes a graph.
+    """Makes a graph of edges, pairs of agents with the lower number first; see `Graph`.
 
-    Args:
-        n_agents: number of agents.
-        n_actions: number of actions of each.
-        edges: pairs of agents, the lower number first.
-        solver: one of the numbers in `solvers.SOLVERS`.
-        rounds: see `Graph`.
-        eliminates: whether the solver needs the functions that elimination leaves.
-
-    Raises:
-        InputError: elimination of a graph with so many edges that these functions grow too large.
+    `eliminates` says whether the solver needs the functions that elimination leaves; `InputError`
+    is raised where so many edges make these too large.
     """
     order, left = order_elimination(n_agents, edges)
     scopes = [*edges, *(left if eliminates else [])]

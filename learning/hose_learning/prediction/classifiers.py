@@ -28,13 +28,9 @@ ClusterRule = Literal["matched", "majority"]
 class ClusterClassifier:
     """Clusters found without the classes, which then name the clusters.
 
-    Args:
-        clusterer: has `fit` and `predict`.
-        rule: "matched" gives each of two clusters a class of its own, in the way with fewer errors
-            on the training set; "majority" gives any cluster the class of most of its instances.
-
-    Raises:
-        InputError: another rule, or more than two clusters to be matched.
+    The rule "matched" gives each of two clusters a class of its own, in the way with fewer errors
+    on the training set; "majority" gives any cluster the class of most of its instances.
+    `InputError` is raised for another rule, or more than two clusters to be matched.
     """
 
     def __init__(self, clusterer: Any, rule: ClusterRule) -> None:

@@ -16,23 +16,13 @@ from hose_mj.constraints.hose_distance import BALL
 from hose_mj.constraints.kinds import KIND_OF, KINDS, OBSTACLE, RUN_OVER, Kind, Watched
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.margin_kernels import OTHER_KIND, Ints, Tables, measure_margins
-from hose_mj.hoses.geds.shapes import (
-    BOUND,
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    KIND,
-    PLANE,
-    ROW,
-    SIZE,
-    SPHERE,
-)
+from hose_mj.hoses.geds import shapes
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compile_notice
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.world import World
 
-_SIMPLE = (PLANE, SPHERE, CAPSULE, CYLINDER, BOX)
+_SIMPLE = (shapes.PLANE, shapes.SPHERE, shapes.CAPSULE, shapes.CYLINDER, shapes.BOX)
 _INSIDE = 1e-9
 """Tension is sampled this part of a segment's length inside its ends, where it may jump."""
 
@@ -175,7 +165,7 @@ class Monitor:
         t = self._tables
         # Those geoms of robots that the kernels cannot measure.
         strange = [
-            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == OTHER_KIND]
+            [int(t.ids[g]) for g in range(low, high) if t.rows[g, shapes.KIND] == OTHER_KIND]
             for low, high in pairwise(t.robot_rows)
         ]
         self._probe: HoseProbe | None = None
@@ -355,9 +345,9 @@ def _find_segments(places: Array, attachments: Array) -> Ints:
 def _make_rows(world: World, ids: Ints) -> Array:
     """Makes the rows of geoms (G, ROW), without their poses."""
     model = world.model
-    rows = np.zeros((len(ids), ROW))
+    rows = np.zeros((len(ids), shapes.ROW))
     kinds = model.geom_type[ids]
-    rows[:, KIND] = np.where(np.isin(kinds, _SIMPLE), kinds, OTHER_KIND)
-    rows[:, SIZE : SIZE + 3] = model.geom_size[ids]
-    rows[:, BOUND] = np.where(kinds == PLANE, 0.0, model.geom_rbound[ids])
+    rows[:, shapes.KIND] = np.where(np.isin(kinds, _SIMPLE), kinds, OTHER_KIND)
+    rows[:, shapes.SIZE : shapes.SIZE + 3] = model.geom_size[ids]
+    rows[:, shapes.BOUND] = np.where(kinds == shapes.PLANE, 0.0, model.geom_rbound[ids])
     return rows

@@ -16,27 +16,15 @@ from scipy.interpolate import BSpline
 from hose_mj.constraints.kinds import KINDS
 from hose_mj.hoses.geds.basis import DEGREE, make_knots
 from hose_mj.hoses.protocol import Array
-from hose_mj.recording.scene_description import (
-    WORLD,
-    Geom,
-    KindStyle,
-    Margin,
-    Rgba,
-    SceneDescription,
-)
+from hose_mj.recording import scene_description, world_episode
+from hose_mj.recording.scene_description import WORLD, Geom, SceneDescription
 from hose_mj.recording.sinks import Sink
-from hose_mj.recording.world_episode import (
-    NO_TURN,
-    BreakMark,
-    EpisodeEnding,
-    SampleBuffer,
-    WorldEpisode,
-)
+from hose_mj.recording.world_episode import EpisodeEnding, SampleBuffer
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.scene_geoms import KIND_NAMES
 from hose_mj.world.world import World
 
-KIND_STYLES = tuple(KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
+KIND_STYLES = tuple(scene_description.KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
 N_POINTS = 81
 """Points along the hose that are recorded."""
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows geoms and sites of groups 0, 1 and 2
@@ -215,12 +203,12 @@ def compute_tension_limit(world: World, monitor: Any | None) -> float:
     return float(monitor.limits.compute_tension_limit(world.scene.spec, gravity))
 
 
-def list_margins(monitor: Any | None) -> tuple[Margin, ...]:
+def list_margins(monitor: Any | None) -> tuple[scene_description.Margin, ...]:
     """Returns what a monitor measures."""
     if monitor is None:
         return ()
     parts = zip(monitor.names, monitor.kinds, monitor.units, monitor.limit_texts, strict=True)
-    return tuple(Margin(*part) for part in parts)
+    return tuple(scene_description.Margin(*part) for part in parts)
 
 
 def place(position: Array, quaternion: Array, origin: Array, turn: Array) -> None:
@@ -231,7 +219,7 @@ def place(position: Array, quaternion: Array, origin: Array, turn: Array) -> Non
     position[:], quaternion[:] = origin + moved, turned
 
 
-def find_color(model: mujoco.MjModel, geom: int) -> Rgba:
+def find_color(model: mujoco.MjModel, geom: int) -> scene_description.Rgba:
     """Returns a geom's colour; where a material has a texture, times the texture's mean."""
     material = int(model.geom_matid[geom])
     if material < 0:
@@ -246,7 +234,7 @@ def find_color(model: mujoco.MjModel, geom: int) -> Rgba:
     return to_bytes(rgba)
 
 
-def to_bytes(rgba: Array) -> Rgba:
+def to_bytes(rgba: Array) -> scene_description.Rgba:
     """Returns a colour of numbers from 0 to 1 as integers from 0 to 255."""
     red, green, blue, opacity = (int(x) for x in np.rint(255.0 * np.clip(rgba, 0.0, 1.0)))
     return red, green, blue, opacity
@@ -331,7 +319,7 @@ class Capture:
             margins = monitor.measure() if monitor is not None else np.zeros(0)
         numbers = {
             "time": world.time,
-            "turn": info.get("turn", NO_TURN),
+            "turn": info.get("turn", world_episode.NO_TURN),
             "reward": info.get("reward", 0.0),
             "margins": margins,
             **self._read(world),
@@ -353,11 +341,11 @@ class Capture:
         for sink in self._sinks:
             sink.end(self._outcome)
 
-    def episode(self) -> WorldEpisode:
+    def episode(self) -> world_episode.WorldEpisode:
         """Returns the episode that has ended, where `keep` was asked for and there are samples."""
         assert self._kept is not None, "made with keep=True, and started"
         assert self.scene is not None
-        return WorldEpisode(
+        return world_episode.WorldEpisode(
             self.scene, self._kept.copy(), self._outcome or EpisodeEnding("running")
         )
 
@@ -393,11 +381,11 @@ class Capture:
             sink.add(samples)
 
 
-def make_mark(broken: Any | None) -> BreakMark | None:
+def make_mark(broken: Any | None) -> world_episode.BreakMark | None:
     """Turns a `Break` into what a recording shows of it."""
     if broken is None:
         return None
-    return BreakMark(
+    return world_episode.BreakMark(
         broken.kind,
         broken.time,
         np.array(broken.place),

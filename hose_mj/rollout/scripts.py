@@ -7,7 +7,6 @@ the likeliest first, from a scene's geometry.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -97,15 +96,12 @@ class Player:
     def update(self) -> None:
         """Writes the controls of the next step."""
         elapsed = self._driver.world.time - self._begun
-        self._driver.drive_to(_interpolate(elapsed, self._times, self._formations))
+        times, formations = self._times, self._formations
+        k = min(int(np.searchsorted(times, elapsed, side="right")), len(times) - 1)
+        span = times[k] - times[k - 1]
+        share = min(1.0, (elapsed - times[k - 1]) / span) if span > 0.0 else 1.0
+        self._driver.drive_to((1.0 - share) * formations[k - 1] + share * formations[k])
         self._driver.update()
-
-
-def _interpolate(time: float, times: Array, formations: Sequence[Array] | Array) -> Array:
-    k = min(int(np.searchsorted(times, time, side="right")), len(times) - 1)
-    span = times[k] - times[k - 1]
-    share = min(1.0, (time - times[k - 1]) / span) if span > 0.0 else 1.0
-    return np.asarray((1.0 - share) * formations[k - 1] + share * formations[k])
 
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))

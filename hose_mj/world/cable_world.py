@@ -68,7 +68,12 @@ class CableWorld(MujocoWorld):
         check_number("timestep", timestep)
         self._layout = ChainLayout(spec.length, segments)
         self._kind = BallJoints(spec, twist)
-        self._held = self._locate_holds(scene)
+        arcs = np.array([*(robot.arc_length for robot in scene.robots), 0.0])
+        index, along = self._layout.locate(arcs)
+        if len(set(index.tolist())) < len(index):
+            valid = "so many that each robot, and the source, holds one of its own"
+            raise InputError("segments", segments, valid)
+        self._held = list(zip(index.tolist(), along.tolist(), strict=True))
         if substeps is None:
             stable = compute_stable_step(spec, self._layout.segment_length, twist)
             most = min(_LONGEST, _SAFETY * stable)
@@ -77,15 +82,6 @@ class CableWorld(MujocoWorld):
         nodes[-1] = spec.length
         self._tension_places = nodes[1:-1]
         super().__init__(scene, nodes, Numerics(timestep, substeps, "discrete", "sparse"))
-
-    def _locate_holds(self, scene: Scene) -> list[tuple[int, float]]:
-        """Segment of each attachment and the distance from its first node (m)."""
-        arcs = np.array([*(robot.arc_length for robot in scene.robots), 0.0])
-        index, along = self._layout.locate(arcs)
-        if len(set(index.tolist())) < len(index):
-            valid = "so many that each robot, and the source, holds one of its own"
-            raise InputError("segments", self._layout.segments, valid)
-        return list(zip(index.tolist(), along.tolist(), strict=True))
 
     def _make_hose(
         self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]

@@ -24,6 +24,10 @@ BANDWIDTH = 60.0
 """Of the servos that move a site directly (1/s): within 10 % of a step after 0.065 s."""
 BRAKING = 5.0
 """Braking (m/s^2) that stops a robot within half a cell: what the highest speed comes from."""
+_DRIVABLE = (
+    "motors that move its site in x and y, or two that turn parallel wheels of one body; else set "
+    "world.control yourself"
+)
 
 
 class Driver:
@@ -82,7 +86,9 @@ class Driver:
                 self.wheeled += (motors.robot,)
                 servos.append(WheelServo(world, wheels, speed))
             else:
-                raise _refuse(world, motors)
+                names = [world.model.actuator(int(i)).name or str(i) for i in motors.ids]
+                name = world.scene.robots[motors.robot].name
+                raise InputError(f"motors of robot {name}", names, _DRIVABLE)
         if sliding:
             servos.append(SlideServo(world, sliding, bandwidth, speed))
         self._servos = tuple(servos)
@@ -121,13 +127,3 @@ class Driver:
         rows = np.zeros((3, world.model.nv))
         mujoco.mj_jacSite(world.model, world.data, rows, None, int(world.sites[robot]))
         return float(np.linalg.norm((rows @ world.data.qvel)[: self.axes[robot]]))
-
-
-def _refuse(world: World, motors: Motors) -> InputError:
-    names = [world.model.actuator(int(i)).name or str(i) for i in motors.ids]
-    valid = (
-        "motors that move its site in x and y, or two that turn parallel wheels of one body; "
-        "else set world.control yourself"
-    )
-    robot = world.scene.robots[motors.robot]
-    return InputError(f"motors of robot {robot.name}", names, valid)

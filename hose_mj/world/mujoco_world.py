@@ -24,15 +24,9 @@ from hose_mj.hoses.mujoco.model import mute_warnings, went_bad
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf.scene import Scene
+from hose_mj.world import mujoco_scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.initial_shape import N_POINTS, relax_initial_shape
-from hose_mj.world.mujoco_scene import (
-    PREFIX,
-    HoseContact,
-    Numerics,
-    join_hose,
-    open_scene,
-)
 from hose_mj.world.world import World
 
 _ROUNDS = 50
@@ -71,20 +65,22 @@ class MujocoWorld(World):
     _tension_places: Array
     """Arc lengths where tensions are known (m)."""
 
-    def __init__(self, scene: Scene, nodes: Array, numerics: Numerics) -> None:
+    def __init__(self, scene: Scene, nodes: Array, numerics: mujoco_scene.Numerics) -> None:
         check_plain(type(self).__name__, scene.spec)
         self.nodes, self.substeps = nodes, numerics.substeps
         self._timestep = numerics.timestep
         maker = scene.make_spec()
         numerics.apply(maker.option)
-        contact, obstacles = open_scene(scene, maker, nodes, numerics.timestep)
+        contact, obstacles = mujoco_scene.open_scene(scene, maker, nodes, numerics.timestep)
         hose = self._make_hose(scene.spec, contact, numerics.tie_options())
-        model, self.hose_bodies = join_hose(scene, maker, hose, numerics.tie_options())
+        model, self.hose_bodies = mujoco_scene.join_hose(scene, maker, hose, numerics.tie_options())
         self._finish_model(scene.spec, model)
         super().__init__(scene, model)
         first = int(model.body_dofadr[self.hose_bodies[0]])
         self._joints = slice(first, first + int(model.body_dofnum[self.hose_bodies].sum()))
-        self._holds = [model.equality(f"{PREFIX}hold{k}").id for k in range(len(self.arc_lengths))]
+        self._holds = [
+            model.equality(f"{mujoco_scene.PREFIX}hold{k}").id for k in range(len(self.arc_lengths))
+        ]
         self._motion: ChainMotion | FlexMotion | None = None
         self._forces = np.zeros((len(self.arc_lengths), 3))
         self._tensions = np.zeros(0)
@@ -103,7 +99,7 @@ class MujocoWorld(World):
 
     @abstractmethod
     def _make_hose(
-        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
+        self, spec: HoseSpec, contact: mujoco_scene.HoseContact, ties: dict[str, list[float]]
     ) -> mujoco.MjSpec:
         """A model of the hose alone, with sites hold0, hold1, ... for robots and source.
 

@@ -42,7 +42,11 @@ class PlanarPointRobots:
         full = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
         mass[self._at], drag[self._at] = np.diag(full), model.dof_damping
-        self._constant = self._find_constant_force()
+        # What acts at rest, (nv,): weight, and what MuJoCo takes off it.
+        rest = mujoco.MjData(model)
+        rest.qpos[:] = data.qpos
+        mujoco.mj_forward(model, rest)
+        self._constant = np.array(rest.qfrc_smooth)
         flat = bool(np.isinf(mass[:, 2]).all())
         reach, radius = np.zeros((2, k))
         for i, site in enumerate(self._sites):
@@ -148,14 +152,6 @@ class PlanarPointRobots:
             first = np.unique(owner, return_index=True)
             contact.pushes[first[1], :3] = masses.push[first[0]]
         return done
-
-    def _find_constant_force(self) -> Array:
-        """Generalised forces (nv,) that act at rest: weight, and what MuJoCo takes off it."""
-        world = self._world
-        data = mujoco.MjData(world.model)
-        data.qpos[:] = world.data.qpos
-        mujoco.mj_forward(world.model, data)
-        return np.array(data.qfrc_smooth)
 
     def _find_motor_forces(self) -> Array:
         """Generalised forces (nv,) of the motors under the world's controls."""

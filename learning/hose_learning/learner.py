@@ -7,24 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
+from hose_learning import records
 from hose_learning.mediators import MEDIATORS
 from hose_learning.modules import make_arrays, make_masks, make_module_rewards
-from hose_learning.records import (
-    EPSILON,
-    FRESH,
-    N_COUNTERS,
-    N_NUMBERS,
-    TEMPERATURE,
-    Learner,
-    Memory,
-)
+from hose_learning.records import Memory
 from hose_learning.settings import POLICIES, Exploration, LearnerSettings
 from hose_learning.tables import Table, make_table
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-Made = tuple[Learner, Memory]
+Made = tuple[records.Learner, Memory]
 """What the factory of a learner returns."""
 
 
@@ -51,7 +44,7 @@ def make_learner(
     thresholds = np.array([-np.inf if m.threshold is None else m.threshold for m in values])
     exploration = settings.exploration
     has_none = settings.fallback == "none" and "none" in task.action_names
-    learner = Learner(
+    learner = records.Learner(
         rule=rule,
         columns=seen.columns,
         strides=seen.strides,
@@ -94,11 +87,11 @@ def _make_memory(
 ) -> Memory:
     """Makes a memory in which nobody has moved yet, for so many value and veto modules."""
     n_agents, (n_values, n_vetoes) = task.n_agents, counts
-    numbers = np.zeros(N_NUMBERS)
-    numbers[EPSILON] = exploration.epsilon
-    numbers[TEMPERATURE] = exploration.epsilon * exploration.temperature_factor
-    counters = np.zeros(N_COUNTERS, np.int64)
-    counters[FRESH] = 1
+    numbers = np.zeros(records.N_NUMBERS)
+    numbers[records.EPSILON] = exploration.epsilon
+    numbers[records.TEMPERATURE] = exploration.epsilon * exploration.temperature_factor
+    counters = np.zeros(records.N_COUNTERS, np.int64)
+    counters[records.FRESH] = 1
 
     def integers(*shape: int) -> Integers:
         return np.zeros(shape, np.int64)

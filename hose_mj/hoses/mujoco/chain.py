@@ -11,13 +11,8 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.mujoco.chain_holds import (
-    Held,
-    Load,
-    add_equality,
-    check_segments,
-    compute_equality_reaction,
-)
+from hose_mj.hoses.mujoco import chain_holds
+from hose_mj.hoses.mujoco.chain_holds import Held, Load
 from hose_mj.hoses.mujoco.chain_layout import (
     ChainKind,
     ChainLayout,
@@ -68,8 +63,8 @@ class ChainModel(MujocoModel[ChainMotion]):
         for item in held:
             if not item.rigid:
                 (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
-                add_equality(maker, bodies[index], along, item, settings.hold_options())
-        check_segments(self.layout, held)
+                chain_holds.add_equality(maker, bodies[index], along, item, settings.hold_options())
+        chain_holds.check_segments(self.layout, held)
         try:
             model = maker.compile()
         except ValueError as error:
@@ -151,7 +146,7 @@ class ChainModel(MujocoModel[ChainMotion]):
             arm = self.data.subtree_com[self.bodies[0]] - held.position
             return Reaction(wrench[3:].copy(), wrench[:3] + np.cross(arm, wrench[3:]))
         body = self.point(held.hold.arc_length).body
-        return compute_equality_reaction(self.model, self.data, held, body)
+        return chain_holds.compute_equality_reaction(self.model, self.data, held, body)
 
     def tension(self, arc_lengths: Array) -> Array:
         """Axial force in the joints, straight lines between and beyond them."""

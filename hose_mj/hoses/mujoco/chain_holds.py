@@ -10,13 +10,7 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.mujoco.chain_layout import (
-    ChainLayout,
-    conjugate,
-    exponential,
-    multiply,
-    rotation_vector,
-)
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.protocol import Array, Hold, Reaction
 
 
@@ -73,9 +67,11 @@ class Held:
 
     def ahead(self, steps: float) -> tuple[Array, Array]:
         """Pose that a target moving on as in this step reaches so many steps later."""
-        turn = rotation_vector(multiply(self.frame, conjugate(self.last_frame)))
+        turn = chain_layout.rotation_vector(
+            chain_layout.multiply(self.frame, chain_layout.conjugate(self.last_frame))
+        )
         position = self.position + steps * (self.position - self.last_position)
-        return position, multiply(exponential(steps * turn), self.frame)
+        return position, chain_layout.multiply(chain_layout.exponential(steps * turn), self.frame)
 
 
 @dataclass(frozen=True)
@@ -156,7 +152,7 @@ def find_rows(data: mujoco.MjData, equality: int) -> np.ndarray:
     )
 
 
-def check_segments(layout: ChainLayout, held: Sequence[Held]) -> None:
+def check_segments(layout: chain_layout.ChainLayout, held: Sequence[Held]) -> None:
     """Raises `InputError` for two holds on one rigid segment."""
     arc_lengths = np.array([item.hold.arc_length for item in held])
     index, _ = layout.locate(arc_lengths)

@@ -8,20 +8,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hose_mj.hoses.mujoco import flex_rod
 from hose_mj.hoses.mujoco.chain import check_plain
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, find_rows
 from hose_mj.hoses.mujoco.chain_layout import rotation_matrix
 from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion, interpolate
-from hose_mj.hoses.mujoco.flex_rod import (
-    BALLAST,
-    FlexProblem,
-    FlexSettings,
-    FlexSystem,
-    add_connect,
-    make_rod,
-    name_hold,
-    spread_loads,
-)
+from hose_mj.hoses.mujoco.flex_rod import FlexSettings
 from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.mujoco.statics import solve_equilibrium
@@ -51,16 +43,21 @@ class FlexModel(MujocoModel[FlexMotion]):
         self.stiffness = spec.bending_stiffness
         self._rest = np.zeros((len(self.mass), 3))
         self._rest[:, 0] = self.layout.nodes
-        maker = make_rod(spec, self._rest, self.mass, settings.edge_options())
+        maker = flex_rod.make_rod(spec, self._rest, self.mass, settings.edge_options())
         settings.apply(maker.option)
-        self._ballast = BALLAST * spec.mass
+        self._ballast = flex_rod.BALLAST * spec.mass
         for item in held:
             for vertex in self.layout.find_vertices(item.hold):
-                add_connect(maker, item, vertex, self._ballast, settings.hold_options())
+                flex_rod.add_connect(maker, item, vertex, self._ballast, settings.hold_options())
         super().__init__(maker.compile(), settings.lead, _ADVICE)
         self._scratch = mujoco.MjData(self.model)
         self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.mass))])
-        self._free = self._find_free_edges(held)
+        self._free = np.ones(len(self.layout.edges), dtype=bool)
+        for item in held:
+            if item.hold.fixes_tangent:
+                self._free[self.layout.find_vertices(item.hold)[0]] = False
+        if not self._free.any():
+            self._free[:] = True
         self._tensions = np.zeros(len(self.layout.edges))
 
     # State.
@@ -114,7 +111,9 @@ class FlexModel(MujocoModel[FlexMotion]):
     def reaction(self, held: Held) -> Reaction:
         """Sum of what the constraints of a hold do to its vertices."""
         vertices = self.layout.find_vertices(held.hold)
-        forces = np.stack([self._find_rows(name_hold(held, vertex)) for vertex in vertices])
+        forces = np.stack(
+            [self._find_rows(flex_rod.name_hold(held, vertex)) for vertex in vertices]
+        )
         forces -= self._ballast * self.data.qacc.reshape(-1, 3)[vertices]
         return self._add_up(held, forces)
 
@@ -135,14 +134,14 @@ class FlexModel(MujocoModel[FlexMotion]):
         for item in held:
             vertices = self.layout.find_vertices(item.hold)
             for vertex, where in zip(vertices, self._find_targets(item, lead), strict=True):
-                place = self.model.body(f"target-{name_hold(item, vertex)}").mocapid[0]
+                place = self.model.body(f"target-{flex_rod.name_hold(item, vertex)}").mocapid[0]
                 self.data.mocap_pos[place] = where
 
     def write_loads(self, loads: Sequence[Load]) -> None:
         """Sets the forces on the vertices for this pose."""
         self.data.xfrc_applied[:] = 0.0
         if loads:
-            forces = spread_loads(self.layout, self.motion().vertices, tuple(loads))
+            forces = flex_rod.spread_loads(self.layout, self.motion().vertices, tuple(loads))
             self.data.xfrc_applied[self._bodies, :3] = forces
 
     def _run(self, n_steps: int, loads: Sequence[Load]) -> None:
@@ -173,10 +172,10 @@ class FlexModel(MujocoModel[FlexMotion]):
         self.keep_settled(np.concatenate(wrenches), held)
         self._tensions, self._forces_known = -multipliers[:count], True
 
-    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> FlexSystem:
+    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> flex_rod.FlexSystem:
         vertices = [self.layout.find_vertices(item.hold) for item in held]
         targets = [self._find_targets(item, 0.0) for item in held]
-        problem = FlexProblem(
+        problem = flex_rod.FlexProblem(
             self.layout,
             self.mass,
             np.array(self.model.opt.gravity),
@@ -186,7 +185,7 @@ class FlexModel(MujocoModel[FlexMotion]):
             np.concatenate([np.zeros((0, 3)), *targets]),
             tuple(loads),
         )
-        return FlexSystem(problem, self.motion().vertices)
+        return flex_rod.FlexSystem(problem, self.motion().vertices)
 
     def _compute_bending(self, vertices: Array) -> Array:
         """MuJoCo's bending forces (N + 1, 3), N, at rest."""
@@ -212,13 +211,6 @@ class FlexModel(MujocoModel[FlexMotion]):
     def _find_rows(self, name: str) -> Array:
         """Forces of an equality constraint's rows."""
         return np.array(self.data.efc_force[find_rows(self.data, self.model.equality(name).id)])
-
-    def _find_free_edges(self, held: Sequence[Held]) -> np.ndarray:
-        free = np.ones(len(self.layout.edges), dtype=bool)
-        for item in held:
-            if item.hold.fixes_tangent:
-                free[self.layout.find_vertices(item.hold)[0]] = False
-        return free if free.any() else ~free
 
     def _add_up(self, held: Held, forces: Array) -> Reaction:
         """Forces on a hold's vertices as force and moment about its target."""

@@ -220,7 +220,13 @@ class FlexSystem(StaticSystem):
                     behind, span = self._applied(), 2 * width
                 full[vertex[near], :, moved[near], c] = ((behind - ahead) / span)[near]
         self.set_pose(here)
-        self._add_edge_stiffness(full, multipliers)
+        pulls = -multipliers[: len(self._lengths)] / self._lengths  # turning the tensions
+        for k, (tangent, pull) in enumerate(zip(self._tangents, pulls, strict=True)):
+            block = pull * (np.eye(3) - np.outer(tangent, tangent))
+            full[k, :, k] += block
+            full[k + 1, :, k + 1] += block
+            full[k, :, k + 1] -= block
+            full[k + 1, :, k] -= block
         return full.reshape(3 * count, 3 * count)
 
     def largest_turn(self, change: Array) -> float:
@@ -240,16 +246,6 @@ class FlexSystem(StaticSystem):
         weight = problem.masses[:, None] * problem.gravity
         forces = spread_loads(problem.layout, self.pose, problem.loads)
         return np.asarray(problem.bend(self.pose) + weight + forces)
-
-    def _add_edge_stiffness(self, full: Array, multipliers: Array) -> None:
-        """Adds what turning the tensions does."""
-        pulls = -multipliers[: len(self._lengths)] / self._lengths
-        for k, (tangent, pull) in enumerate(zip(self._tangents, pulls, strict=True)):
-            block = pull * (np.eye(3) - np.outer(tangent, tangent))
-            full[k, :, k] += block
-            full[k + 1, :, k + 1] += block
-            full[k, :, k + 1] -= block
-            full[k + 1, :, k] -= block
 
 
 def spread_loads(layout: FlexLayout, vertices: Array, loads: tuple[Load, ...]) -> Array:

@@ -10,15 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, check_choice
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_layout import (
-    ChainKind,
-    ChainLayout,
-    conjugate,
-    multiply,
-    rotation_matrix,
-    rotation_vector,
-)
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
@@ -93,7 +86,7 @@ class HingeChainHose(MujocoChainHose):
         super().__init__(spec, HingeJoints(spec, plane), settings)
 
 
-class HingeJoints(ChainKind):
+class HingeJoints(chain_layout.ChainKind):
     """Hinges normal to a plane, a key of `PLANE_FRAMES`."""
 
     def __init__(self, spec: HoseSpec, plane: str) -> None:
@@ -101,10 +94,10 @@ class HingeJoints(ChainKind):
         self.base_frame = PLANE_FRAMES[plane]
         self.stiffness = (0.0, spec.bending_stiffness)
         self.twists = False
-        self._axes = rotation_matrix(self.base_frame)
+        self._axes = chain_layout.rotation_matrix(self.base_frame)
 
     def make_chain(
-        self, layout: ChainLayout, root: tuple[Array, Array] | None
+        self, layout: chain_layout.ChainLayout, root: tuple[Array, Array] | None
     ) -> tuple[mujoco.MjSpec, list[Any]]:
         """Bodies B_0, B_1, ...; without a root two slides and a hinge carry the first."""
         h, maker = layout.segment_length, mujoco.MjSpec()
@@ -131,10 +124,14 @@ class HingeJoints(ChainKind):
 
     def to_qpos(self, start: Array, frames: Array, rooted: bool) -> Array:
         """Two slides and an angle unless rooted, then one angle per hinge."""
-        angles = rotation_vector(multiply(conjugate(frames[:-1]), frames[1:]))[:, 2]
+        angles = chain_layout.rotation_vector(
+            chain_layout.multiply(chain_layout.conjugate(frames[:-1]), frames[1:])
+        )[:, 2]
         if rooted:
             return angles
-        first = rotation_vector(multiply(conjugate(self.base_frame), frames[0]))[2]
+        first = chain_layout.rotation_vector(
+            chain_layout.multiply(chain_layout.conjugate(self.base_frame), frames[0])
+        )[2]
         return np.concatenate([(self._axes.T @ start)[:2], [first], angles])
 
     def to_qvel(self, velocity: Array, spins: Array, frames: Array, rooted: bool) -> Array:

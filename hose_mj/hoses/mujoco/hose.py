@@ -16,14 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import (
-    check_arc_lengths,
-    check_count,
-    check_curve_points,
-    check_vector,
-    sample_curve,
-    sample_velocity,
-)
+from hose_mj.hoses import inputs
+from hose_mj.hoses.inputs import check_arc_lengths, check_vector
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
 from hose_mj.hoses.mujoco.chain_layout import exponential, multiply, rotation_matrix, turn_frame
 from hose_mj.hoses.mujoco.chain_motion import ChainMotion
@@ -133,12 +127,12 @@ class MujocoHose(ABC):
     def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
         """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads."""
         made = self._make_model([])
-        points = sample_curve(curve, self.spec.length, made.layout.nodes)
-        check_curve_points(points)
+        points = inputs.sample_curve(curve, self.spec.length, made.layout.nodes)
+        inputs.check_curve_points(points)
         points = self._check_points("curve", points)
         speeds = None
         if velocity is not None:
-            speeds = sample_velocity(velocity, self.spec.length, made.layout.nodes)
+            speeds = inputs.sample_velocity(velocity, self.spec.length, made.layout.nodes)
         made.lay(points, speeds)
         self._model, self._held, self._loads = made, list[Held](), list[Load]()
 
@@ -236,7 +230,7 @@ class MujocoHose(ABC):
         Raises:
             StepError: MuJoCo met a NaN or a huge number; the state before the call is kept.
         """
-        if check_count("n_steps", n_steps, 0) == 0:
+        if inputs.check_count("n_steps", n_steps, 0) == 0:
             return
         self._model.step(n_steps, self._held, self._loads)
         self._held = [held.arrived() for held in self._held]

@@ -14,17 +14,8 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import StepError
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain_holds import Held, Load
-from hose_mj.hoses.mujoco.chain_layout import (
-    ChainKind,
-    ChainLayout,
-    conjugate,
-    exponential,
-    multiply,
-    rotation_matrix,
-    rotation_vector,
-    turn_frame,
-)
 from hose_mj.hoses.protocol import Array, Linearization
 
 _MOST_TURN, _LEAST_TURN = 0.5, 0.02  # rad a segment may turn in one iteration
@@ -223,11 +214,11 @@ class BodyPoint:
 class StaticChain:
     """A compiled chain: its joints, model, body ids, whether its first segment is fixed, nodes."""
 
-    kind: ChainKind
+    kind: chain_layout.ChainKind
     model: mujoco.MjModel
     bodies: np.ndarray
     rooted: bool
-    layout: ChainLayout
+    layout: chain_layout.ChainLayout
 
 
 class ChainSystem(StaticSystem):
@@ -269,8 +260,8 @@ class ChainSystem(StaticSystem):
     def advance(self, change: Array) -> None:
         """Moves by a change of the unknowns (n,)."""
         full = change @ self._freedoms
-        turns = exponential(full[3:].reshape(-1, 3))
-        self.set_pose((self.pose[0] + full[:3], multiply(turns, self.pose[1])))
+        turns = chain_layout.exponential(full[3:].reshape(-1, 3))
+        self.set_pose((self.pose[0] + full[:3], chain_layout.multiply(turns, self.pose[1])))
 
     def drop_idle(self) -> None:
         """Undoes the twist of the joints of a hose without GJ, but next to clamps."""
@@ -280,7 +271,9 @@ class ChainSystem(StaticSystem):
         held = {point.body for point, item in self.holds if item.hold.fixes_tangent}
         for k in range(1, len(frames)):
             if self.chain.bodies[k] not in held:
-                frames[k] = turn_frame(frames[k - 1], rotation_matrix(frames[k])[:, 0])
+                frames[k] = chain_layout.turn_frame(
+                    frames[k - 1], chain_layout.rotation_matrix(frames[k])[:, 0]
+                )
         self.set_pose((start, frames))
 
     def force(self, multipliers: Array) -> Array:
@@ -307,7 +300,11 @@ class ChainSystem(StaticSystem):
             parts.append(self._world(point) - item.position)
             if item.hold.fixes_tangent:
                 now = self.data.xquat[point.body]
-                parts.append(rotation_vector(multiply(now, conjugate(item.frame))))
+                parts.append(
+                    chain_layout.rotation_vector(
+                        chain_layout.multiply(now, chain_layout.conjugate(item.frame))
+                    )
+                )
         return np.concatenate(parts)
 
     def constraints(self) -> Array:

@@ -9,14 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from scipy.sparse import csr_array
 
-from hose_learning.mdp.explicit_mdp import (
-    MarkovModel,
-    WrittenTask,
-    compute_safe_actions,
-    evaluate,
-    solve,
-    write_out,
-)
+from hose_learning.mdp import explicit_mdp
+from hose_learning.mdp.explicit_mdp import MarkovModel, WrittenTask
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import TURN, Floats, Integers
 from hose_mj.tasks.registry import make_task
@@ -213,15 +207,17 @@ def compute_propositions(
     source: MarkovModel, target: MarkovModel, projection: Integers, discount: float = 0.9
 ) -> Propositions:
     """Measures Propositions 4 and 5 on a pair of tasks; `projection` has no `ABSENT` state."""
-    safe = compute_safe_actions(target)
-    unsafe_in_source = safe & ~compute_safe_actions(source)[projection]
-    transferred = solve(source, discount)[projection]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
+    safe = explicit_mdp.compute_safe_actions(target)
+    unsafe_in_source = safe & ~explicit_mdp.compute_safe_actions(source)[projection]
+    transferred = explicit_mdp.solve(source, discount)[
+        projection
+    ]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
     return Propositions(
         unsafe_in_source=int(unsafe_in_source.sum()),
         # Nothing follows on a terminal state of the target, whatever does in the source.
         bounds=np.where(target.terminal, 0.0, transferred.max(axis=1)),
-        best=solve(target, discount).max(axis=1),
-        greedy=evaluate(target, choose_greedy(transferred, safe), discount),
+        best=explicit_mdp.solve(target, discount).max(axis=1),
+        greedy=explicit_mdp.evaluate(target, choose_greedy(transferred, safe), discount),
     )
 
 
@@ -325,8 +321,8 @@ def write_pair(
         if _measure(place) > sizes.get(name, 0):
             raise InputError(f"size of {name!r} in the source", _measure(place), "the target's")
     start = target.reset(make_stream(random))
-    written_source = write_out(source, [project_state(source, target, start)], limit)
-    written_target = write_out(target, [start], limit)
+    written_source = explicit_mdp.write_out(source, [project_state(source, target, start)], limit)
+    written_target = explicit_mdp.write_out(target, [start], limit)
     return WrittenPair(
         written_source,
         written_target,

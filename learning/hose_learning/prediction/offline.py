@@ -13,16 +13,9 @@ import numpy as np
 from scipy.stats import t as student
 
 from hose_learning.experience import Experience, record_experience
+from hose_learning.prediction import cross_validation
 from hose_learning.prediction.attributes import Encoding, make_attributes
 from hose_learning.prediction.classifiers import CLASSIFIERS, ClusterRule, Setup, make_classifier
-from hose_learning.prediction.cross_validation import (
-    MEASURES,
-    MakeClassifier,
-    Score,
-    compute_score,
-    cross_validate,
-    make_splits,
-)
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats
@@ -88,7 +81,7 @@ def _make_row(per_cent: dict[str, float]) -> Published:
     return Published(measures, not is_between)
 
 
-Scores = dict[str, Score]
+Scores = dict[str, cross_validation.Score]
 """By the names of `MEASURES`."""
 
 LIFTED = 10**9
@@ -196,15 +189,17 @@ def score_log(
         own = experience.select(agent)
         attributes, _ = make_attributes(own, plan.encoding)
         undesired = own.undesired
-        splits = make_splits(undesired, plan.repeats, plan.folds, generator)
+        splits = cross_validation.make_splits(undesired, plan.repeats, plan.folds, generator)
         setup = Setup(attributes.shape[1], float(undesired.mean()), plan.cluster_rule, 0)
         for id in CLASSIFIERS:
             make = _make_maker(id, setup)
-            scored[agent, id] = cross_validate(make, attributes, undesired, splits, on_fold)
+            scored[agent, id] = cross_validation.cross_validate(
+                make, attributes, undesired, splits, on_fold
+            )
     return scored
 
 
-def _make_maker(id: str, setup: Setup) -> MakeClassifier:
+def _make_maker(id: str, setup: Setup) -> cross_validation.MakeClassifier:
     return lambda seed: make_classifier(id, replace(setup, seed=seed))
 
 
@@ -223,9 +218,9 @@ def list_records(study: Study) -> list[dict[str, Any]]:
     records = []
     for result in study.results:
         published = result.published
-        for name in MEASURES:
+        for name in cross_validation.MEASURES:
             score = result.scores[name]
-            over_logs = compute_score(result.over_logs[name], 0.0)
+            over_logs = cross_validation.compute_score(result.over_logs[name], 0.0)
             records.append(
                 {
                     "agent": result.agent,

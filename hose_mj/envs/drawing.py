@@ -57,14 +57,9 @@ def look_at(episode: Episode) -> Moment:
 
 
 class Renderer:
-    """Draws the episodes of one environment.
+    """Draws the episodes of one environment in one of `RENDER_MODES`; None draws nothing.
 
-    Args:
-        task: what is played.
-        mode: one of `RENDER_MODES`, or None to draw nothing.
-
-    Raises:
-        InputError: an unknown mode.
+    `InputError` is raised for an unknown mode.
     """
 
     def __init__(self, task: Task, mode: str | None) -> None:

@@ -30,14 +30,7 @@ AGENT_COLORS: tuple[Rgb, ...] = (
 
 @dataclass(frozen=True)
 class Mark:
-    """Something that stands on a cell.
-
-    Attributes:
-        kind: `SOURCE`, `GOAL`, `STATION`, `ROBOT`, `TAXI` or `PASSENGER`.
-        at: where it stands.
-        label: its number or letter, in at most two characters.
-        color: red, green, blue, 0 to 255.
-    """
+    """Something that stands on a cell: its kind, place, label of at most two characters, colour."""
 
     kind: str
     at: Point

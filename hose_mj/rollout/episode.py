@@ -67,14 +67,9 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How an episode ended, and how long it took.
+    """How an episode ended, with which break, if any, and how long it took, simulated (s).
 
-    Attributes:
-        steps: of the world.
-        sim_time: simulated (s).
-        ended_by: "break", "goal" or "duration".
-        broken: the break that ended it; None where none did.
-        stalled: actions that robots gave up.
+    `stalled` counts the actions that robots gave up.
     """
 
     steps: int

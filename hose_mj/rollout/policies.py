@@ -312,9 +312,6 @@ class Breaking(_Scripted):
     """Breaks one constraint of a kind before any other.
 
     Scripts from the scene's geometry are rehearsed; the first with that break is played.
-
-    Args:
-        kind: name of one of `KINDS`.
     """
 
     ends_at_goal = False
@@ -377,13 +374,9 @@ PATIENCE = 1.5
 
 @dataclass(frozen=True)
 class RehearsedScript:
-    """A script that was played, and what came of it.
+    """A script that was played, its first break, if any, and when it ended (s).
 
-    Attributes:
-        script: played.
-        broken: its first break; None where there was none.
-        at_goal: whether the tip reached the goal before.
-        time: when it ended (s).
+    `at_goal` says whether the tip reached the goal before.
     """
 
     script: Script

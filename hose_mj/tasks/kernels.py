@@ -193,10 +193,8 @@ def compute_safe_mask(record: Any, state: Integers, agent: int, scratch: Integer
 class Projection(NamedTuple):
     """A set of variables as one mixed-radix number; made by `variables.make_projection`.
 
-    Attributes:
-        columns: the variables' places among all (k,), the fastest running one last.
-        strides: what a step of each adds to the index (k,).
-        size: number of different indices.
+    The variables' places among all (k,), the fastest running one last; what a step of each adds to
+    the index (k,); and the number of different indices.
     """
 
     columns: Integers

@@ -16,13 +16,9 @@ LARGEST_SIZE = 2**62
 
 @dataclass(frozen=True)
 class Variable:
-    """One state variable.
+    """One state variable, whose values are 0 .. cardinality - 1; their meaning is in words.
 
-    Attributes:
-        name: its name, the thesis's where there is one.
-        cardinality: its values are 0 .. cardinality - 1.
-        meaning: what the values say, in words.
-        per_agent: whether each agent sees a value of its own.
+    `per_agent` says whether each agent sees a value of its own.
     """
 
     name: str

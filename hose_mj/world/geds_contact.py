@@ -27,15 +27,9 @@ _PROBE_RADIUS = 1e-4
 class GedsContact:
     """Hands a scene's geoms to a spline hose as obstacles, and what it does to them to MuJoCo.
 
-    Args:
-        model, data: MuJoCo's, poses as at the start.
-        hose: the hose.
-        sites, arc_lengths: as in `World`.
-
-    Attributes:
-        geoms: what may be touched.
-        pushes: what the hose has done in the last step to each of `geoms.moving`, force and moment
-            about the geom's position, (k, 6), N, N m.
+    Poses are as at the start. `geoms` are what may be touched; `pushes` is what the hose has done
+    in the last step to each of `geoms.moving`, force and moment about the geom's position, (k, 6),
+    N, N m.
     """
 
     def __init__(

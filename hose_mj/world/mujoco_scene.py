@@ -33,13 +33,7 @@ HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 
 @dataclass(frozen=True)
 class Numerics:
-    """How MuJoCo steps a scene with a hose.
-
-    Attributes:
-        timestep: of the world (s).
-        substeps: MuJoCo's steps in one of these.
-        integrator, jacobian: MuJoCo's names.
-    """
+    """How MuJoCo steps a scene with a hose; `substeps` of its steps are one of the world's (s)."""
 
     timestep: float
     substeps: int

@@ -230,13 +230,7 @@ class MujocoWorld(World):
 
 @dataclass(frozen=True)
 class Pin:
-    """A point of a chain that is to be at a target.
-
-    Attributes:
-        piece: number of the straight piece.
-        part: fraction of the piece that lies before the point.
-        target: (3,), m.
-    """
+    """A point of a chain, at a part of one of its straight pieces, that is to be at (3,), m."""
 
     piece: int
     part: float

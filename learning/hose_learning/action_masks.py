@@ -109,15 +109,9 @@ class VetoMasks:
     """What a veto learner forbids, as masks; it can go on learning.
 
     Vetoes are those of boolean modules (section 5.3) and of values below their thresholds (section
-    4.5). Only the former can be learned here. Several environments may share one of these: what one
-    of them runs into, all of them avoid.
-
-    Args:
-        training: whose vetoes they are, trained or not. They are copied: the training stays as it
-            is.
-
-    Attributes:
-        task: the task that it was trained on.
+    4.5), of a training that may be trained or not. They are copied: the training stays as it is.
+    Only the former can be learned here. Several environments may share one of these: what one of
+    them runs into, all of them avoid.
     """
 
     def __init__(self, training: Training) -> None:

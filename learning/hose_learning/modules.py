@@ -59,11 +59,9 @@ class Module:
 class Arrays:
     """What loops need of modules of one kind.
 
-    Attributes:
-        columns: places of the variables among all (n_modules, width).
-        strides: what a step of each adds to the key; 0 pads (n_modules, width).
-        bases: first key of each agent (n_modules, n_agents).
-        size: number of keys.
+    A variable has a place among all and adds a stride to the key for each step, 0 where it pads
+    (n_modules, width); `bases` are the first key of each agent (n_modules, n_agents), `size` is the
+    number of keys.
     """
 
     columns: Integers

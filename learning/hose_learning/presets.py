@@ -24,12 +24,7 @@ VETO_THRESHOLD = -10.0
 class Constraint:
     """What one way to break a constraint has to do with.
 
-    Attributes:
-        name: for messages and listings.
-        variables: the variables that tell it.
-        events: its events.
-        signals: its reward signals.
-        actions: the actions concerned; none for all.
+    Variables tell it; `actions` are those concerned, none for all.
     """
 
     name: str
@@ -41,14 +36,10 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Parts:
-    """What a task consists of for a modular learner.
+    """What a task consists of for a modular learner, each part as names of variables.
 
-    Attributes:
-        state: variables that together are the whole state, as far as it matters.
-        goal: variables that the goal module sees.
-        local: those that it sees of what is near the agent.
-        signals: reward signals of the goal.
-        constraints: those of the task.
+    `state` are those that together are the whole state, as far as it matters; the goal module sees
+    `goal`, or `local`, what is near the agent, and learns from `signals`.
     """
 
     state: tuple[str, ...]

@@ -24,13 +24,7 @@ _LARGEST_NUMBER = 2**62
 
 @dataclass(frozen=True)
 class Signal:
-    """What one veto module would answer to.
-
-    Attributes:
-        name: for listings.
-        event: the task's event.
-        actions: the actions concerned; none for all.
-    """
+    """What one veto module would answer to: an event and the actions concerned, none for all."""
 
     name: str
     event: str
@@ -39,13 +33,10 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Relevance:
-    """What Algorithm 5.1 found.
+    """What Algorithm 5.1 found of some variables and signals, in their order.
 
-    Attributes:
-        variables: the variables tested, as they were given.
-        signals: the signals.
-        relevant: whether a variable matters for a signal (n_variables, n_signals).
-        n_seen: logged moves with the signal's event (n_signals,).
+    `relevant` says whether a variable matters for a signal (n_variables, n_signals); `n_seen`
+    counts logged moves with the signal's event (n_signals,).
     """
 
     variables: tuple[str, ...]

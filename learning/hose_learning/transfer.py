@@ -102,11 +102,8 @@ def make_image(source: Task, source_module: Module, target: Task, target_module:
 class Match:
     """A module that source and target have in common.
 
-    Attributes:
-        name: its name.
-        table: the field of the memory that holds its rows.
-        image: how its keys relate.
-        parts: first key of each agent in the source and in the target.
+    `table` is the field of the memory that holds its rows, `image` how its keys relate, `parts` the
+    first key of each agent in the source and in the target.
     """
 
     name: str

@@ -213,9 +213,6 @@ class MujocoChainHose(MujocoHose):
     Static holds are exact. Unstable equilibria are left, but not by a shape exactly in one, and not
     where a moment acts. `linearize` has the first node and the rotation vectors of the segments, in
     the world frame, without those of a first segment that is part of the world.
-
-    Attributes:
-        settings: numerics.
     """
 
     _model: ChainModel

@@ -16,16 +16,11 @@ from hose_mj.hoses.protocol import Array, Hold, Reaction
 
 @dataclass(frozen=True)
 class Held:
-    """A hold and where it is to be.
+    """A hold and where it is to be: a point (3,), m, and a frame (4,) that attachments ignore.
 
-    Attributes:
-        hold: the user's handle.
-        position: target of the point (3,), m.
-        frame: target of the segment's frame (4,); an attachment ignores it.
-        last_position: target of the step before.
-        last_frame: target of the step before.
-        rigid: the first segment is part of the world, else an equality constraint holds it.
-        spun: sum of the spins since the step before (rad).
+    `last_position` and `last_frame` are those of the step before, `spun` is the sum of the spins
+    since then (rad). Where it is `rigid` the first segment is part of the world, else an equality
+    constraint holds it.
     """
 
     hold: Hold

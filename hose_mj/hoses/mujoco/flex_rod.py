@@ -123,15 +123,9 @@ _REACH = 5  # a vertex's bending force depends on two neighbours to either side
 class FlexProblem:
     """What a flex rod is to be in equilibrium with.
 
-    Attributes:
-        layout: its vertices.
-        masses: of the vertices (N + 1,), kg.
-        gravity: (3,) m/s^2.
-        bending_stiffness: EI (N m^2).
-        bend: bending forces (N + 1, 3), N, of vertices (N + 1, 3).
-        held: vertices that are held (h,).
-        targets: where (h, 3), m.
-        loads: point loads.
+    `masses` are of the vertices (N + 1,), kg, gravity (3,) m/s^2, `bending_stiffness` EI (N m^2).
+    `bend` returns bending forces (N + 1, 3), N, of vertices (N + 1, 3); the vertices `held` (h,)
+    are to be at `targets` (h, 3), m.
     """
 
     layout: FlexLayout

@@ -21,12 +21,9 @@ _APART = 1e-6
 
 @dataclass(frozen=True)
 class Timed:
-    """A change from `start` on, for `duration`.
+    """A change from `start` on (s), for `duration` (s).
 
-    Attributes:
-        start: s.
-        duration: s.
-        profile: "smooth" (half a cosine: starts and ends at rest) or "linear".
+    Its profile is "smooth" (half a cosine: starts and ends at rest) or "linear".
     """
 
     start: float

@@ -68,14 +68,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Place:
-    """A site.
-
-    Attributes:
-        site: its name.
-        body: the name of its body.
-        position: where it is at the start (m).
-        moves: whether its body can move.
-    """
+    """A site in a body, where it is at the start (m), and whether the body can move."""
 
     site: str
     body: str

@@ -101,13 +101,9 @@ class Action(NamedTuple):
 
 @dataclass(frozen=True)
 class Record:
-    """What a simulation saw.
+    """What a simulation saw: rates v_i (N,), turns per unit of time; clocks; actions as they began.
 
-    Attributes:
-        rates: v_i of each clock (N,), turns per unit of time.
-        clocks: xi_i at the beginning of each round (n_rounds, N).
-        actions: in the order in which they began.
-        round_time: time between two rows of `clocks`.
+    `clocks` are xi_i at the beginning of each round (n_rounds, N), `round_time` apart.
     """
 
     rates: Floats

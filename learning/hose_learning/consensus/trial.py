@@ -31,14 +31,7 @@ SHOWN_ACTIONS = 16
 
 
 class ConsensusTrial(NamedTuple):
-    """One loss: clocks alone, agents that act by them, and what was measured.
-
-    Attributes:
-        settings: the network.
-        clocks: clocks that run alone.
-        play: agents that act.
-        record: numbers for the document.
-    """
+    """One loss: clocks that run alone, agents that act (`play`), and numbers for the document."""
 
     settings: ConsensusSettings
     clocks: Record

@@ -28,13 +28,7 @@ OPTIONS = {**coordination.OPTIONS, "update": "edge"}
 
 
 class Sparse(NamedTuple):
-    """The rule's constants.
-
-    Attributes:
-        discount: gamma.
-        graph: the coordination graph.
-        updates_by_agent: see `OPTIONS`.
-    """
+    """The rule's constants: gamma, the coordination graph, and what `OPTIONS` says of updates."""
 
     discount: float
     graph: Graph

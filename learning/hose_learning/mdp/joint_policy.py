@@ -70,12 +70,10 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Composition:
-    """A joint move that agents agreed on.
+    """A joint move that agents agreed on: an action for each, in the order of their turns.
 
-    Attributes:
-        actions: one for each agent, in the order of their turns.
-        messages: what each agent got, and at last what the cycle leads to.
-        value: what eqs 6.5 and 6.6 expect of it, rewards that are not positive left out.
+    `messages` are what each agent got, and at last what the cycle leads to; `value` is what eqs 6.5
+    and 6.6 expect of it, rewards that are not positive left out.
     """
 
     actions: tuple[int, ...]
@@ -176,13 +174,7 @@ def estimate(
 
 @dataclass(frozen=True)
 class JointMove:
-    """One joint move of a composed policy.
-
-    Attributes:
-        composition: what was agreed on.
-        state: the state after it.
-        events: what it caused.
-    """
+    """One joint move of a composed policy, the state after it and the events that it caused."""
 
     composition: Composition
     state: Integers

@@ -229,16 +229,9 @@ def choose_greedy(q_values: Floats, allowed: np.ndarray) -> Integers:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two tasks and what Definition 11 says about them.
+    """Two tasks by their ids and options, and the properties of Definition 11 that do not hold.
 
-    Attributes:
-        meaning: in a line.
-        source: id of the source task.
-        target: id of the target task.
-        settings: options of both.
-        source_settings: options of the source alone.
-        target_settings: options of the target alone.
-        violated: the properties that do not hold.
+    `settings` are options of both tasks; `meaning` is a line about the pair.
     """
 
     meaning: str

@@ -31,16 +31,11 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class SequentialViolation:
-    """A property of Definition 10 that does not hold.
+    """A property of Definition 10, a key of `PROPERTIES`, that does not hold.
 
-    Attributes:
-        number: a key of `PROPERTIES`.
-        count: states, agents and actions for which it does not.
-        state: the first such state, in words.
-        agent: name of the agent that acts.
-        action: name of its action.
-        alone: what comes of the action alone.
-        jointly: what comes of the joint action in which it alone is not idle.
+    `count` is the number of states, agents and actions for which it does not; `state` (in words),
+    `agent` and `action` (names) are the first of them. `alone` is what comes of the action alone,
+    `jointly` what comes of the joint action in which it alone is not idle.
     """
 
     number: int
@@ -67,12 +62,9 @@ class MoveOutcome:
 
 @dataclass(frozen=True)
 class SequentialStudy:
-    """What was compared.
+    """What was compared, whosever turn it is, and the properties that do not hold.
 
-    Attributes:
-        n_states: states, whosever turn it is.
-        n_moves: states times agents times actions.
-        violations: the properties that do not hold.
+    `n_moves` is the number of states times agents times actions.
     """
 
     n_states: int

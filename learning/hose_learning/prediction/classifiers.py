@@ -148,14 +148,7 @@ Family = Literal["neighbours", "Bayes", "tree", "clusters", "support vectors", "
 
 @dataclass(frozen=True)
 class Setup:
-    """What a classifier is made for.
-
-    Attributes:
-        n_attributes: number of attributes.
-        undesired_share: share of the undesired instances among all.
-        cluster_rule: how clusters become classes, see `ClusterClassifier`.
-        seed: of its random choices.
-    """
+    """What a classifier is made for; `cluster_rule` is that of `ClusterClassifier`."""
 
     n_attributes: int
     undesired_share: float
@@ -170,14 +163,9 @@ class Setup:
 
 @dataclass(frozen=True)
 class ClassifierEntry:
-    """A classifier.
+    """A classifier: its name in the thesis's tables, what runs here, its family and how it is made.
 
-    Attributes:
-        name: as the thesis's tables have it.
-        runs: what runs here; `stands_in` says whether that is another algorithm.
-        family: what it has in common with others.
-        make: makes one that has learned nothing.
-        stands_in: whether scikit-learn lacks the thesis's algorithm.
+    `stands_in` says whether scikit-learn lacks the thesis's algorithm, so that another one runs.
     """
 
     name: str

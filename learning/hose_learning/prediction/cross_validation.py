@@ -21,14 +21,7 @@ MEASURES = ("accuracy", "sensitivity", "specificity", "npv", "ppv")
 
 
 class Confusion(NamedTuple):
-    """How many instances of each class were taken for which.
-
-    Attributes:
-        true_positives: safe and taken for safe.
-        true_negatives: undesired and taken for undesired.
-        false_positives: undesired and taken for safe.
-        false_negatives: safe and taken for undesired.
-    """
+    """How many instances of each class were taken for which; safe is positive."""
 
     true_positives: int
     true_negatives: int

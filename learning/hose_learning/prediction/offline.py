@@ -43,13 +43,10 @@ class Published:
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """A table of the thesis.
+    """A table of the thesis, such as 8.2: what was classified, in words, and its rows.
 
-    Attributes:
-        number: such as "8.2".
-        data: what was classified, in words.
-        cycles: length of the log, in moves of each agent.
-        agents: for each agent, the rows by id of the classifier.
+    `cycles` is the length of the log, in moves of each agent; `agents` has for each agent the rows
+    by id of the classifier.
     """
 
     number: str
@@ -129,14 +126,10 @@ class OfflinePlan:
 
 @dataclass(frozen=True)
 class Result:
-    """One classifier on one agent's moves.
+    """One classifier on one agent's moves: its scores on the first log, by `MEASURES`.
 
-    Attributes:
-        agent: name of the agent.
-        classifier: id.
-        scores: on the first log, by the names of `MEASURES`.
-        over_logs: the mean of each measure on every log (n_logs,), the first one's first.
-        published: the row of the thesis's table; None without one.
+    `over_logs` has the mean of each measure on every log (n_logs,), the first one's first;
+    `published` is the row of the thesis's table, None without one.
     """
 
     agent: str

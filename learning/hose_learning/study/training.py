@@ -26,12 +26,9 @@ Manner = Literal["turns", "joint", "composed"]
 
 @dataclass(frozen=True)
 class Episodes:
-    """Episodes as columns, one row each.
+    """Episodes as columns (n,): moves of single agents, last events, sums of all rewards.
 
-    Attributes:
-        moves: of single agents (n,).
-        events: those of the last move (n,).
-        returns: sums of all rewards (n,); NaN in a test.
+    The sums are NaN in a test.
     """
 
     moves: Integers

@@ -15,18 +15,11 @@ from hose_mj.tasks.task import Task
 
 
 class DmEnv(dm_env.Environment):
-    """All agents of a task as one actor.
+    """All agents of a task as one actor; arguments are those of `TaskEnv`.
 
     The observation is a dict of `observation`, as in `TaskEnv`, and `action_mask`. The discount is
-    0 where an event has ended the episode, and 1 where the step limit has.
-
-    Args:
-        task: id of a task, or a task.
-        seed: of the first episode; the random numbers go on from one episode to the next.
-        options: those of `TaskEnv`, and of the task.
-
-    Raises:
-        InputError: an unknown task, option or name, or a value outside its valid set.
+    0 where an event has ended the episode, and 1 where the step limit has. The seed is that of the
+    first episode; the random numbers go on from one episode to the next.
     """
 
     def __init__(self, task: str | Task, seed: int | None = None, **options: Any) -> None:

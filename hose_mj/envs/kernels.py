@@ -84,13 +84,7 @@ def play_turn(
 
 
 @jitable
-def play_round(
-    record: Any,
-    state: Integers,
-    actions: Integers,
-    caused_events: Integers,
-    reward_by_mover: Floats,
-) -> int:
+def play_round(record, state, actions, caused_events, reward_by_mover):
     """Lets all agents move, each in its turn until the episode ends, and returns all events."""
     forget(caused_events, reward_by_mover)
     events = 0
@@ -102,13 +96,7 @@ def play_round(
 
 
 @jitable
-def play_joint(
-    record: Any,
-    state: Integers,
-    actions: Integers,
-    caused_events: Integers,
-    reward_by_mover: Floats,
-) -> int:
+def play_joint(record, state, actions, caused_events, reward_by_mover):
     """Lets all agents move at once and returns all events."""
     forget(caused_events, reward_by_mover)
     events = kernels.apply_joint(record, state, actions, caused_events)

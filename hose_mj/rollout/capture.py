@@ -104,13 +104,10 @@ class SceneBodies:
 def describe_scene(
     world: World, monitor: Any | None, settings: Mapping[str, Any], n_points: int = N_POINTS
 ) -> tuple[SceneDescription, SceneBodies]:
-    """Describes the scene of a world as it stands now.
+    """Describes the scene of a world as it stands now, after its reset.
 
-    Args:
-        world: after its reset.
-        monitor: a `hose_mj.constraints.monitor.Monitor`; None where nothing is watched.
-        settings: shown beside the pictures.
-        n_points: points along the hose that are to be recorded.
+    The monitor is a `hose_mj.constraints.monitor.Monitor`, None where nothing is watched; settings
+    are shown beside the pictures, and `n_points` along the hose are to be recorded.
     """
     bodies, scene = SceneBodies(world), world.scene
     geoms = tuple(bodies.make_geom(i) for i in bodies.list_geoms())

@@ -53,10 +53,8 @@ class Observer(Protocol):
     def sample(self, world: World, monitor: Monitor, info: Mapping[str, Any]) -> None:
         """Called at the start, then at the sampling rate, and at the end.
 
-        Args:
-            world: as it stands.
-            monitor: has just checked it.
-            info: what `Policy.describe` says, and `margins`, those of the monitor.
+        The monitor has just checked the world; `info` is what `Policy.describe` says, and
+        `margins`.
         """
         ...
 

@@ -232,24 +232,11 @@ class FlexHose(MujocoHose):
     clamp two; where a new one moves the vertices, the shape between them is cut off anew. In
     statics and in `linearize`, whose coordinates are the vertices, edges and holds are rigid.
 
-    Args:
-        spec: what the hose is made of.
-        timestep: length of one step (s).
-        gravity: (3,) m/s^2.
-        segments: number of edges, at least 2; holds that are no vertex may change it by a few.
-        clamp_correction: False for a clamp at an end that holds the first two vertices; True
-            centres them on the end.
-        iterations: most iterations of MuJoCo's constraint solver.
-        tolerance: its termination tolerance.
-        jacobian: dense, sparse or auto; sparse took a tenth less time for a held rod of 20 edges
-            and two thirds less for one of 80.
-        edge_solref: MuJoCo's solref of the edges; None for that of holds.
-        edge_solimp: their solimp.
-        hold_solref: solref of holds; None for twice the time step, critically damped.
-        hold_solimp: their solimp.
-
-    Raises:
-        InputError: a value outside its valid set.
+    Arguments are those of `CableHose`. Segments are edges here; holds that are no vertex may change
+    their number by a few. A clamp at an end holds the first two vertices, which `clamp_correction`
+    centres on the end. A sparse Jacobian took a tenth less time for a held rod of 20 edges and two
+    thirds less for one of 80. `edge_solref`, None for that of holds, and `edge_solimp` are MuJoCo's
+    of the edges.
     """
 
     _model: FlexModel

@@ -27,12 +27,7 @@ forces are taken off reactions: a soft constraint that holds much inertia gives 
 
 @dataclass(frozen=True, kw_only=True)
 class FlexSettings(ChainSettings):
-    """Settings of a flex rod.
-
-    Attributes:
-        edge_solref: MuJoCo's solref of the edges; None for that of holds.
-        edge_solimp: their solimp.
-    """
+    """Settings of a flex rod; `FlexHose` says what they are."""
 
     edge_solref: Sequence[float] | None
     edge_solimp: Sequence[float]

@@ -28,30 +28,11 @@ PLANE_FRAMES = {
 class HingeChainHose(MujocoChainHose):
     """Rigid segments, hinges and joint springs EI / h: the form most favourable to MuJoCo.
 
-    For validation only: it moves in one plane through the world's origin, without contacts. Its
-    springs are MuJoCo's own, so the integrator "discrete" takes them implicitly. Kelvin-Voigt
-    damping is joint damping tau EI / h. Not mapped: stretching (inextensible), twist, drag,
-    rest_strain and rest_curvature (the last three are errors unless 0). Forces and holds act in the
-    plane only.
-
-    Args:
-        spec: what the hose is made of.
-        timestep: length of one step (s).
-        gravity: (3,) m/s^2.
-        segments: number of rigid segments, at least 2.
-        plane: xy, xz or yz.
-        integrator: euler, implicit, implicitfast, discrete or rk4.
-        clamp_correction: False for a clamp that fixes a whole first segment; True centres the
-            segment of a clamped end on that end.
-        iterations: most iterations of MuJoCo's constraint solver.
-        tolerance: its termination tolerance.
-        jacobian: dense, sparse or auto; MuJoCo's auto is sparse from 60 coordinates on, which
-            makes a hose that is held twice as slow.
-        hold_solref: MuJoCo's solref of holds; None for twice the time step, critically damped.
-        hold_solimp: their solimp.
-
-    Raises:
-        InputError: a value outside its valid set.
+    For validation only: it moves in one plane (xy, xz or yz) through the world's origin, without
+    contacts. Its springs are MuJoCo's own, so the integrator "discrete" takes them implicitly.
+    Kelvin-Voigt damping is joint damping tau EI / h. Not mapped: stretching (inextensible), twist,
+    drag, rest_strain and rest_curvature (the last three are errors unless 0). Forces and holds act
+    in the plane only. All other arguments are those of `CableHose`.
     """
 
     def __init__(

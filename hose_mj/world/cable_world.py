@@ -9,9 +9,8 @@ import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.cable import BallJoints
-from hose_mj.hoses.mujoco.chain_layout import ChainLayout, transport_frames
-from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
 from hose_mj.scenes.mjcf.scene import Scene
@@ -66,7 +65,7 @@ class CableWorld(MujocoWorld):
         check_count("segments", segments, 2)
         timestep = scene.timestep if timestep is None else timestep
         check_number("timestep", timestep)
-        self._layout = ChainLayout(spec.length, segments)
+        self._layout = chain_layout.ChainLayout(spec.length, segments)
         self._kind = BallJoints(spec, twist)
         arcs = np.array([*(robot.arc_length for robot in scene.robots), 0.0])
         index, along = self._layout.locate(arcs)
@@ -88,7 +87,9 @@ class CableWorld(MujocoWorld):
     ) -> mujoco.MjSpec:
         maker, bodies = self._kind.make_chain(self._layout, None)
         h = self._layout.segment_length
-        ChainMass.of_hose(self._layout, spec.linear_density, spec.outer_radius).write(bodies)
+        chain_layout.ChainMass.of_hose(self._layout, spec.linear_density, spec.outer_radius).write(
+            bodies
+        )
         for body, bit in zip(bodies, contact.bits, strict=True):
             for geom in body.geoms:
                 contact.write(geom, int(bit))
@@ -116,13 +117,13 @@ class CableWorld(MujocoWorld):
         model.stat.meaninertia = scale
 
     def _set_nodes(self, nodes: Array) -> None:
-        frames = transport_frames(nodes, self._kind.base_frame)
+        frames = chain_layout.transport_frames(nodes, self._kind.base_frame)
         first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]
         qpos = self._kind.to_qpos(nodes[0], frames, rooted=False)
         self.data.qpos[first : first + len(qpos)] = qpos
 
-    def _read_motion(self) -> ChainMotion:
-        return ChainMotion.read(self.model, self.data, self._layout, self.hose_bodies)
+    def _read_motion(self) -> chain_layout.ChainMotion:
+        return chain_layout.ChainMotion.read(self.model, self.data, self._layout, self.hose_bodies)
 
     def _read_tensions(self) -> Array:
         mujoco.mj_rnePostConstraint(self.model, self.data)

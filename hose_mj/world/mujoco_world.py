@@ -18,7 +18,7 @@ from hose_mj.errors import StepError
 from hose_mj.hoses.inputs import check_arc_lengths, check_count
 from hose_mj.hoses.mujoco.chain import check_plain
 from hose_mj.hoses.mujoco.chain_holds import find_rows
-from hose_mj.hoses.mujoco.chain_motion import ChainMotion
+from hose_mj.hoses.mujoco.chain_layout import ChainMotion
 from hose_mj.hoses.mujoco.flex_layout import FlexMotion, interpolate
 from hose_mj.hoses.mujoco.model import mute_warnings, went_bad
 from hose_mj.hoses.protocol import Array

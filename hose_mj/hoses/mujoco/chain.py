@@ -16,11 +16,12 @@ from hose_mj.hoses.mujoco.chain_holds import Held, Load
 from hose_mj.hoses.mujoco.chain_layout import (
     ChainKind,
     ChainLayout,
+    ChainMass,
+    ChainMotion,
     rotation_matrix,
     transport_frames,
     turn_frame,
 )
-from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings, add_obstacles
 from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel

@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses import inputs
 from hose_mj.hoses.inputs import check_arc_lengths, check_vector
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
-from hose_mj.hoses.mujoco.chain_layout import exponential, multiply, rotation_matrix, turn_frame
-from hose_mj.hoses.mujoco.chain_motion import ChainMotion
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings
 from hose_mj.hoses.mujoco.flex_layout import FlexMotion
 from hose_mj.hoses.mujoco.model import MujocoModel
@@ -35,7 +34,7 @@ class MujocoHose(ABC):
     """
 
     settings: ChainSettings
-    _model: MujocoModel[ChainMotion] | MujocoModel[FlexMotion]
+    _model: MujocoModel[chain_layout.ChainMotion] | MujocoModel[FlexMotion]
     _loads: list[Load]
 
     def __init__(self, spec: HoseSpec, straight: Array) -> None:
@@ -147,7 +146,7 @@ class MujocoHose(ABC):
         where = self._check_target(s, position)
         frame = self._model.motion().frame(s)
         if tangent is not None:
-            frame = turn_frame(frame, self._check_tangent(tangent))
+            frame = chain_layout.turn_frame(frame, self._check_tangent(tangent))
         return self._add_hold(s, where, frame, fixes_tangent=True)
 
     def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
@@ -181,10 +180,12 @@ class MujocoHose(ABC):
             name, value = ("spin", spin) if tangent is None else ("tangent", tangent)
             raise InputError(f"{name} of an attachment", value, "only a clamp's to set")
         if tangent is not None:
-            frame = turn_frame(frame, self._check_tangent(tangent))
+            frame = chain_layout.turn_frame(frame, self._check_tangent(tangent))
         spun = held.spun + self._check_spin(held, spin)
         if spin != 0.0:
-            frame = multiply(exponential(spin * rotation_matrix(frame)[:, 0]), frame)
+            frame = chain_layout.multiply(
+                chain_layout.exponential(spin * chain_layout.rotation_matrix(frame)[:, 0]), frame
+            )
         moved = replace(held, position=where, frame=frame, spun=spun)
         if held.rigid and (np.any(where != held.position) or np.any(frame != held.frame)):
             moved = replace(moved, rigid=False)

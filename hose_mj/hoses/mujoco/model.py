@@ -12,8 +12,7 @@ import numpy as np
 
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.mujoco.chain_holds import Held, Load
-from hose_mj.hoses.mujoco.chain_layout import ChainLayout
-from hose_mj.hoses.mujoco.chain_motion import ChainMotion
+from hose_mj.hoses.mujoco.chain_layout import ChainLayout, ChainMotion
 from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion
 from hose_mj.hoses.mujoco.statics import StaticSystem, linearize
 from hose_mj.hoses.protocol import Array, Energies, Linearization, Momentum, Reaction

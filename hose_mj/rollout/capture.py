@@ -7,7 +7,7 @@ is watched.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -20,7 +20,6 @@ from hose_mj.recording import scene_description, world_episode
 from hose_mj.recording.scene_description import WORLD, Geom, SceneDescription
 from hose_mj.recording.sinks import Sink
 from hose_mj.recording.world_episode import EpisodeEnding, SampleBuffer
-from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.scene_geoms import KIND_NAMES
 from hose_mj.world.world import World
 
@@ -137,8 +136,8 @@ def describe_scene(
 
 def read_control_points(world: World) -> Array:
     """Returns the control points of a spline hose, or the nodes of a chain, (C, 3), m."""
-    if isinstance(world, GedsWorld):
-        return world.hose.control_points
+    if world.hose_model == "geds":
+        return np.asarray(cast(Any, world).hose.control_points)
     return world.hose_position(world.centre_line().arc_lengths)
 
 
@@ -151,9 +150,8 @@ class HoseReader:
     def __init__(self, world: World, arc_lengths: Array) -> None:
         self._arc_lengths = arc_lengths
         self._basis: Array | None = None
-        if isinstance(world, GedsWorld):
-            n = len(world.hose.control_points)
-            knots = make_knots(n, world.scene.spec.length)
+        if world.hose_model == "geds":
+            knots = make_knots(len(read_control_points(world)), world.scene.spec.length)
             self._basis = BSpline.design_matrix(arc_lengths, knots, DEGREE).toarray()
 
     def read(self, world: World) -> tuple[Array, Array]:

@@ -59,9 +59,8 @@ def learn_joint(rule: Coordinated, learner: Learner, memory: Memory, is_over: bo
     for module in range(learner.bases.shape[0]):
         td_target = sum_team_reward(learner, memory, module)
         if not is_over:
-            td_target += rule.discount * coordination.maximize_module(
-                graph, learner, memory, module
-            )
+            best = coordination.maximize_module(graph, learner, memory, module)
+            td_target += rule.discount * best
         value = 0.0
         for edge in range(n_edges):
             value += coordination.get_edge_value(graph, learner, memory, edge, module)

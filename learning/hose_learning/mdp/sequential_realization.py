@@ -6,8 +6,9 @@ agent but the i-th is idle, does what agent i's action a_i does alone (Definitio
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -100,19 +101,19 @@ def study_sequential(
     check_choice("idle action", idle, task.action_names)
     states = _list_states(task, list(starts), limit)
     nothing = task.action_names.index(idle)
-    found: dict[int, list[tuple[Integers, int, int]]] = {number: [] for number in PROPERTIES}
+    counts: Counter[int] = Counter()
+    first: dict[int, SequentialViolation] = {}
     for state in states:
         for agent in range(task.n_agents):
             for action in range(task.n_actions):
                 alone = move_alone(task, state, agent, action, sharing)
                 jointly = move_jointly(task, state, agent, action, nothing, sharing)
                 for number in compare(alone, jointly):
-                    found[number].append((state, agent, action))
-    violations = tuple(
-        _make_violation(task, number, moves, nothing, sharing)
-        for number, moves in found.items()
-        if moves
-    )
+                    counts[number] += 1
+                    if number not in first:
+                        made = _make_violation(task, number, state, agent, action, alone, jointly)
+                        first[number] = made
+    violations = tuple(replace(first[n], count=counts[n]) for n in PROPERTIES if n in first)
     return SequentialStudy(len(states), len(states) * task.n_agents * task.n_actions, violations)
 
 
@@ -181,26 +182,13 @@ def compare(alone: MoveOutcome, jointly: MoveOutcome) -> list[int]:
 
 
 def _make_violation(
-    task: Task,
-    number: int,
-    moves: list[tuple[Integers, int, int]],
-    idle: int,
-    sharing: Sharing,
+    task: Task, number: int, state: Integers, agent: int, action: int, *outcomes: MoveOutcome
 ) -> SequentialViolation:
-    state, agent, action = moves[0]
-    alone = move_alone(task, state, agent, action, sharing)
-    jointly = move_jointly(task, state, agent, action, idle, sharing)
     shown = state.copy()
     shown[TURN] = agent
-    return SequentialViolation(
-        number,
-        len(moves),
-        describe_state(task, shown),
-        task.agents[agent],
-        task.action_names[action],
-        _describe(task, alone),
-        _describe(task, jointly),
-    )
+    names = task.agents[agent], task.action_names[action]
+    texts = (_describe(task, outcome) for outcome in outcomes)
+    return SequentialViolation(number, 1, describe_state(task, shown), *names, *texts)
 
 
 def _describe(task: Task, outcome: MoveOutcome) -> str:

@@ -72,6 +72,9 @@ class Interface:
         """Returns the picture that `render_mode` asks for; None without one."""
         return self._renderer.render(self.episode)
 
+    def close(self) -> None:
+        """Ends nothing: no window is open. PettingZoo wants it of what renders."""
+
 
 class AgentsInterface(Interface):
     """An environment of agents by name, as PettingZoo has them.

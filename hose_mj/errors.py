@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Self
 
 
@@ -36,3 +37,9 @@ class InputError(HoseError, ValueError):
 
 class StepError(HoseError, RuntimeError):
     """A time step or a static solve that no fallback could finish; the state before it is kept."""
+
+
+def check_choice(name: str, value: object, valid: Collection[str]) -> None:
+    """Raises `InputError` unless `value` is one of the valid words."""
+    if value not in valid:
+        raise InputError(name, value, "one of " + ", ".join(valid))

@@ -62,6 +62,7 @@ def run(args: Args) -> int:
     )
     from hose_learning.prediction.report import print_study, write_study
 
+    from hose_mj.cli.check_table import print_checks
     from hose_mj.cli.compare import make_folder
 
     begun = time.perf_counter()
@@ -87,7 +88,8 @@ def run(args: Args) -> int:
     if args.json:
         print_document(document)
     else:
-        print_study(study, checks)
+        print_study(study)
+        print_checks(checks)
     stream = sys.stderr if args.json else sys.stdout
     passed = sum(check.ok for check in checks)
     seconds = time.perf_counter() - begun

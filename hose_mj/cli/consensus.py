@@ -13,8 +13,7 @@ from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from hose_learning.consensus.clocks import ConsensusSettings
-    from hose_learning.consensus.trial import ConsensusTrial
+    from hose_learning.consensus import ConsensusSettings, ConsensusTrial
 
 LOSSES = (0.0, 0.1, 0.5)
 """Shares of lost messages that are always tried, beside the one asked for."""
@@ -61,7 +60,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs the trials; 1 if a check failed."""
-    from hose_learning.consensus.trial import draw_consensus, run_trial
+    from hose_learning.consensus import draw_consensus, run_trial
 
     from hose_mj.recording.files import write_atomically
 
@@ -88,7 +87,7 @@ def run(args: Args) -> int:
 
 def make_settings(args: Args) -> ConsensusSettings:
     """Makes the settings that the arguments describe."""
-    from hose_learning.consensus.clocks import ConsensusSettings
+    from hose_learning.consensus import ConsensusSettings
 
     return ConsensusSettings(
         n_agents=args.agents,

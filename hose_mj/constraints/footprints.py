@@ -50,11 +50,7 @@ class Footprint:
 
 
 def make_footprint(world: World, robot: int) -> Footprint:
-    """Returns the footprint of a robot as the world stands.
-
-    Raises:
-        InputError: a robot without geoms.
-    """
+    """Returns the footprint of a robot as the world stands; `InputError` if it has no geoms."""
     model, data = world.model, world.data
     geoms = np.flatnonzero(np.isin(model.geom_bodyid, world.robot_bodies[robot]))
     if len(geoms) == 0:
@@ -87,18 +83,9 @@ def find_obstacles(
 
     A robot's geom may hit what MuJoCo lets it collide with: by their bits, or by an explicit pair,
     unless their bodies are excluded. What is no obstacle: other robots, the hose, what the robot
-    stands on (`_stands_on`), and the geoms named in `ground`.
-
-    Args:
-        world: as it stands when robots are on their ground.
-        footprints: the robots'.
-        ground: names of geoms.
-
-    Returns:
-        geoms (H,), and a matrix (R, H) for the footprints' geoms, one robot after the other.
-
-    Raises:
-        InputError: a name in `ground` that no geom has.
+    stands on (`_stands_on`) in the world as it stands, and the geoms named in `ground`, where a
+    name that no geom has raises `InputError`. They are geoms (H,), and a matrix (R, H) for the
+    footprints' geoms, one robot after the other.
     """
     model = world.model
     names = [model.geom(g).name for g in range(model.ngeom)]
@@ -186,12 +173,9 @@ class Nearest(NamedTuple):
 class HoseProbe:
     """Measures the hose against geoms, in a small mjModel of these and one capsule.
 
-    Args:
-        model: the world's.
-        geoms: for each robot the numbers of its geoms to be measured.
-        own: arc lengths between which a robot's own hose lies (N, 2), m.
-        radius: of the hose, m.
-        arcs: arc lengths at the ends of the centre line's pieces (K + 1,), m.
+    `geoms` are those of each robot that are to be measured, `own` the arc lengths between which its
+    own hose lies (N, 2), m; `radius` is the hose's (m), and `arcs` are the ends of the centre
+    line's pieces (K + 1,), m.
     """
 
     def __init__(
@@ -214,15 +198,9 @@ class HoseProbe:
         self._data = mujoco.MjData(self._model)
 
     def measure(self, data: Any, line: CentreLine, most: Array) -> list[Nearest | None]:
-        """For each robot the place where the hose's surface is nearest to the geoms in question.
+        """Finds for each robot the place where the hose's surface is nearest to its geoms.
 
-        Args:
-            data: the world's.
-            line: the hose's centre line.
-            most: for each robot, farther than this (m) is not looked for.
-
-        Returns:
-            None for a robot where nothing is nearer.
+        Farther than `most` (m) is not looked for; None for a robot where nothing is nearer.
         """
         points = line.position(self._arcs)
         middles, along = 0.5 * (points[:-1] + points[1:]), np.diff(points, axis=0)

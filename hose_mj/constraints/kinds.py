@@ -27,16 +27,8 @@ class Watched(NamedTuple):
     has_obstacles: bool
 
 
-def _list_segments(watched: Watched) -> list[Members]:
-    return [(None, segment) for segment in range(watched.n_robots)]
-
-
 def _list_robots(watched: Watched) -> list[Members]:
     return [(robot, None) for robot in range(watched.n_robots)]
-
-
-def _list_pairs(watched: Watched) -> list[Members]:
-    return list(combinations(range(watched.n_robots), 2))
 
 
 class Kind(NamedTuple):
@@ -76,7 +68,7 @@ KINDS = (
         sentence="segment {other} of the hose was stretched too far",
         limit="tension at most {limit:.4g} N",
         clearance=lambda limits, radius: 0.0,
-        members=_list_segments,
+        members=lambda watched: [(None, segment) for segment in range(watched.n_robots)],
         needs="a scene with a hose",
         script="list_stretches",
         other="segment",
@@ -100,7 +92,7 @@ KINDS = (
         sentence="robots {robot} and {other} collided",
         limit="robots at least {limit:.3g} m apart",
         clearance=lambda limits, radius: limits.collision_distance,
-        members=_list_pairs,
+        members=lambda watched: list(combinations(range(watched.n_robots), 2)),
         needs="a scene with two robots or more (floor_2 to floor_6, corridor, deck, lift)",
         script="list_collisions",
         other="robot",

@@ -83,11 +83,7 @@ class Limits:
         return TOUCHING * radius if near is None else near
 
     def compute_own_arc(self, radius: float) -> float:
-        """Returns how much hose (m) to either side of an attachment never counts as run over.
-
-        Args:
-            radius: of the robot that holds it (m).
-        """
+        """Returns how much hose (m) beside the attachment of a robot of a radius (m) is its own."""
         return OWN_RADII * radius if self.own_arc is None else self.own_arc
 
     def compute_sight(self, radius: float) -> float:

@@ -276,13 +276,7 @@ def _measure_bounds(t: Tables, sites: Array) -> None:
 
 
 @kernel
-def measure_margins(
-    t: Tables,
-    line: tuple[Array, Array],
-    tensions: Array,
-    sites: Array,
-    poses: tuple[Array, Array],
-) -> int:
+def measure_margins(t, line, tensions, sites, poses):
     """Writes all margins with their places.
 
     Args:
@@ -301,5 +295,4 @@ def measure_margins(
     _measure_stretch(t, arcs, coefficients, tensions)
     _measure_run_over(t, arcs, coefficients)
     _measure_bounds(t, sites)
-    queued: int = _measure_bodies(t)
-    return queued
+    return _measure_bodies(t)

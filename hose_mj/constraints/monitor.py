@@ -16,23 +16,13 @@ from hose_mj.constraints.hose_distance import BALL
 from hose_mj.constraints.kinds import KIND_OF, KINDS, OBSTACLE, RUN_OVER, Kind, Watched
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.margin_kernels import OTHER_KIND, Ints, Tables, measure_margins
-from hose_mj.hoses.geds.shapes import (
-    BOUND,
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    KIND,
-    PLANE,
-    ROW,
-    SIZE,
-    SPHERE,
-)
+from hose_mj.hoses.geds import shapes
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compile_notice
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.world import World
 
-_SIMPLE = (PLANE, SPHERE, CAPSULE, CYLINDER, BOX)
+_SIMPLE = (shapes.PLANE, shapes.SPHERE, shapes.CAPSULE, shapes.CYLINDER, shapes.BOX)
 _INSIDE = 1e-9
 """Tension is sampled this part of a segment's length inside its ends, where it may jump."""
 
@@ -116,7 +106,10 @@ class Monitor:
         ]
         self._prepare(world.centre_line().arc_lengths)
         self.kinds = tuple(KINDS[k].name for k, _, _ in self._margins)
-        self.names = tuple(_name_margin(*margin) for margin in self._margins)
+        self.names = tuple(
+            f"{KINDS[k].name} {'-'.join(str(n) for n in members if n is not None)}"
+            for k, *members in self._margins
+        )
         self.units = tuple(KINDS[k].unit for k, _, _ in self._margins)
         nearest = [self._tables.tension, *self._tables.clearances[1:]]
         texts = [kind.limit.format(limit=most) for kind, most in zip(KINDS, nearest, strict=True)]
@@ -169,7 +162,15 @@ class Monitor:
         """Makes the tables for a centre line with pieces between these arc lengths."""
         self._arcs, world = arcs, self.world
         self._tables = make_tables(world, self.limits, self._footprints, self._obstacles, arcs)
-        self._probe = self._make_probe(arcs)
+        t = self._tables
+        # Those geoms of robots that the kernels cannot measure.
+        strange = [
+            [int(t.ids[g]) for g in range(low, high) if t.rows[g, shapes.KIND] == OTHER_KIND]
+            for low, high in pairwise(t.robot_rows)
+        ]
+        self._probe: HoseProbe | None = None
+        if any(strange):
+            self._probe = HoseProbe(world.model, strange, t.own, t.radius, arcs)
 
     def _measure(self) -> _Measurement:
         world = self.world
@@ -238,15 +239,6 @@ class Monitor:
         body = model.body(model.geom_bodyid[geom]).name
         return str(model.geom(geom).name) or f"geom {geom} of {body}"
 
-    def _make_probe(self, arcs: Array) -> HoseProbe | None:
-        """A probe for those geoms of robots that the kernels cannot measure, where there are."""
-        t = self._tables
-        strange = [
-            [int(t.ids[g]) for g in range(low, high) if t.rows[g, KIND] == OTHER_KIND]
-            for low, high in pairwise(t.robot_rows)
-        ]
-        return HoseProbe(self.world.model, strange, t.own, t.radius, arcs) if any(strange) else None
-
 
 def make_tables(
     world: World,
@@ -255,14 +247,10 @@ def make_tables(
     obstacles: tuple[Ints, NDArray[np.bool_]],
     arcs: Array,
 ) -> Tables:
-    """Makes the tables; see `Tables`.
+    """Makes the tables of a world that is to be measured against limits; see `Tables`.
 
-    Args:
-        world: to be measured.
-        limits: what its margins are measured against.
-        footprints: of its robots.
-        obstacles: as `find_obstacles` returns them.
-        arcs: ends of the pieces of its centre line (K + 1,), m.
+    `obstacles` are as `find_obstacles` returns them, `arcs` the ends of the centre line's pieces (K
+    + 1,), m.
     """
     n, spec = world.n_robots, world.scene.spec
     geoms, may_hit = obstacles
@@ -316,20 +304,11 @@ def find_watched(world: World, obstacles: Ints) -> Watched:
     return Watched(world.n_robots, has_bounds, len(obstacles) > 0)
 
 
-def _name_margin(k: int, robot: int | None, other: int | None) -> str:
-    numbers = [str(n) for n in (robot, other) if n is not None]
-    return f"{KINDS[k].name} {'-'.join(numbers)}"
-
-
 def split_hose(arcs: Array, attachments: Array) -> tuple[Ints, Array]:
-    """Cuts the hose at the ends of pieces and at the attachments.
+    """Cuts the hose at the ends of pieces (K + 1,) and at the attachments, tip first (N + 1,), m.
 
-    Args:
-        arcs: ends of the pieces (K + 1,), m.
-        attachments: of robots, tip first, and source (N + 1,), m.
-
-    Returns:
-        piece and segment (P, 2), and where each part begins and ends within its piece (P, 2).
+    Returned are piece and segment (P, 2), and where each part begins and ends within its piece (P,
+    2).
     """
     cuts = np.unique(np.concatenate([arcs, attachments]))
     cuts = cuts[cuts <= attachments[0]]
@@ -344,10 +323,8 @@ def place_samples(arcs: Array, attachments: Array) -> tuple[Array, Ints]:
     """Chooses arc lengths between which every model's tension is a straight line.
 
     Tension is known at the joints of a cable, the middles of a flex's edges and of a spline's
-    spans: ends and middles of pieces, and just inside the ends of the segments.
-
-    Returns:
-        arc lengths (T,), m, and the segment of each (T,).
+    spans: ends and middles of pieces, and just inside the ends of the segments. Returned are arc
+    lengths (T,), m, and the segment of each (T,).
     """
     known = np.concatenate([arcs, 0.5 * (arcs[:-1] + arcs[1:])])
     inside = [
@@ -368,9 +345,9 @@ def _find_segments(places: Array, attachments: Array) -> Ints:
 def _make_rows(world: World, ids: Ints) -> Array:
     """Makes the rows of geoms (G, ROW), without their poses."""
     model = world.model
-    rows = np.zeros((len(ids), ROW))
+    rows = np.zeros((len(ids), shapes.ROW))
     kinds = model.geom_type[ids]
-    rows[:, KIND] = np.where(np.isin(kinds, _SIMPLE), kinds, OTHER_KIND)
-    rows[:, SIZE : SIZE + 3] = model.geom_size[ids]
-    rows[:, BOUND] = np.where(kinds == PLANE, 0.0, model.geom_rbound[ids])
+    rows[:, shapes.KIND] = np.where(np.isin(kinds, _SIMPLE), kinds, OTHER_KIND)
+    rows[:, shapes.SIZE : shapes.SIZE + 3] = model.geom_size[ids]
+    rows[:, shapes.BOUND] = np.where(kinds == shapes.PLANE, 0.0, model.geom_rbound[ids])
     return rows

@@ -15,18 +15,11 @@ from hose_mj.tasks.task import Task
 
 
 class DmEnv(dm_env.Environment):
-    """All agents of a task as one actor.
+    """All agents of a task as one actor; arguments are those of `TaskEnv`.
 
     The observation is a dict of `observation`, as in `TaskEnv`, and `action_mask`. The discount is
-    0 where an event has ended the episode, and 1 where the step limit has.
-
-    Args:
-        task: id of a task, or a task.
-        seed: of the first episode; the random numbers go on from one episode to the next.
-        options: those of `TaskEnv`, and of the task.
-
-    Raises:
-        InputError: an unknown task, option or name, or a value outside its valid set.
+    0 where an event has ended the episode, and 1 where the step limit has. The seed is that of the
+    first episode; the random numbers go on from one episode to the next.
     """
 
     def __init__(self, task: str | Task, seed: int | None = None, **options: Any) -> None:
@@ -49,8 +42,7 @@ class DmEnv(dm_env.Environment):
     def step(self, action: Any) -> dm_env.TimeStep:
         """Lets all agents move, or starts an episode where none runs.
 
-        Raises:
-            InputError: an action out of range.
+        `InputError` is raised for an action out of range.
         """
         if not self.env.episode.is_running:
             return self.reset()
@@ -71,10 +63,6 @@ class DmEnv(dm_env.Environment):
     def state(self) -> Integers:
         """Returns a copy of the task's state, with turn and step count before it."""
         return self.env.state()
-
-    def close(self) -> None:
-        """Ends the rendering."""
-        self.env.close()
 
 
 def make_spec(space: spaces.Space[Any], name: str) -> Any:

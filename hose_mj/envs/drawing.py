@@ -34,8 +34,7 @@ from hose_mj.recording.grid import Array, GridEpisode, GridTrack
 from hose_mj.tasks.kernels import STEPS, Integers
 from hose_mj.tasks.line.kernels import ABSENT, Line
 from hose_mj.tasks.task import Task
-from hose_mj.tasks.taxi.kernels import WIDTH, Taxi
-from hose_mj.tasks.taxi.settings import STATIONS
+from hose_mj.tasks.taxi.kernels import STATIONS, WIDTH, Taxi
 from hose_mj.tasks.tiny.kernels import Corridor, Maze
 
 RENDER_MODES = ["human", "ansi", "rgb_array", "rerun"]
@@ -58,14 +57,9 @@ def look_at(episode: Episode) -> Moment:
 
 
 class Renderer:
-    """Draws the episodes of one environment.
+    """Draws the episodes of one environment in one of `RENDER_MODES`; None draws nothing.
 
-    Args:
-        task: what is played.
-        mode: one of `RENDER_MODES`, or None to draw nothing.
-
-    Raises:
-        InputError: an unknown mode.
+    `InputError` is raised for an unknown mode.
     """
 
     def __init__(self, task: Task, mode: str | None) -> None:
@@ -98,9 +92,6 @@ class Renderer:
         if self.mode == "rerun":
             return encode_moments(self.task, self._history)
         return None
-
-    def close(self) -> None:
-        """Ends the drawing."""
 
     def _write(self, episode: Episode) -> str:
         return write_picture(make_picture(self.task, episode.state, episode.events))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hose_mj.envs import kernels
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.jit import compile_notice
 from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
 from hose_mj.tasks.stream import Stream, make_stream
@@ -180,6 +180,5 @@ def check_names(thing: str, names: Sequence[str], known: Sequence[str]) -> None:
 
 def check_moves(moves: str) -> bool:
     """Returns whether all agents move at once; `InputError` for anything but a name in `MOVES`."""
-    if moves not in MOVES:
-        raise InputError("moves", moves, f"one of {', '.join(MOVES)}")
+    check_choice("moves", moves, MOVES)
     return moves == "joint"

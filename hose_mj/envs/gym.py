@@ -68,11 +68,7 @@ class TaskEnv(Interface, gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Starts an episode.
-
-        Raises:
-            InputError: options, of which there are none.
-        """
+        """Starts an episode; `InputError` for options, of which there are none."""
         gymnasium.Env.reset(self, seed=seed)
         refuse_reset_options(options)
         self.episode.reset(self.np_random)
@@ -80,11 +76,7 @@ class TaskEnv(Interface, gymnasium.Env[Any, Any]):
         return self._observe(), self._make_info()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Lets all agents move.
-
-        Raises:
-            InputError: an action out of range, or an episode that is over.
-        """
+        """Lets all agents move; `InputError` if it is over or an action is out of range."""
         episode = self.episode
         episode.play_all(split_action(self.task, action), self.at_once)
         reward = float(sum_signals(episode.compute_team_signals(), episode.chosen))

@@ -53,13 +53,7 @@ def refuse_reset_options(options: dict[str, Any] | None) -> None:
 
 
 class Interface:
-    """An environment of one copy of a task; comes before the library's own class.
-
-    Args:
-        task: what is played.
-        rewards: reward signals whose sum is the reward; None for all.
-        render_mode: one of `RENDER_MODES`, or None.
-    """
+    """An environment of one copy of a task; comes before the library's own class."""
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 10}  # noqa: RUF012
 
@@ -79,8 +73,7 @@ class Interface:
         return self._renderer.render(self.episode)
 
     def close(self) -> None:
-        """Ends the rendering; may be called again."""
-        self._renderer.close()
+        """Ends nothing: no window is open. PettingZoo wants it of what renders."""
 
 
 class AgentsInterface(Interface):

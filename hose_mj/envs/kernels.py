@@ -13,19 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hose_mj.jit import jitable, kernel, parallel
-from hose_mj.tasks.kernels import (
-    TURN,
-    Floats,
-    Integers,
-    add_rewards,
-    apply,
-    apply_joint,
-    is_cut_off,
-    is_over,
-    mask,
-    observe,
-    reset,
-)
+from hose_mj.tasks import kernels
+from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.stream import Stream
 
 Flags = npt.NDArray[np.int8]
@@ -86,46 +75,36 @@ def play_turn(
     record: Any, state: Integers, action: int, caused_events: Integers, reward_by_mover: Floats
 ) -> int:
     """Lets the agent whose turn it is move, adds to its rows and returns the events."""
-    mover = state[TURN]
-    events = apply(record, state, mover, action)
+    mover = state[kernels.TURN]
+    events = kernels.apply(record, state, mover, action)
     caused_events[mover] |= events
     for agent in range(record.n_agents):
-        add_rewards(record, events, mover, agent, reward_by_mover[mover, agent])
+        kernels.add_rewards(record, events, mover, agent, reward_by_mover[mover, agent])
     return events
 
 
 @jitable
-def play_round(
-    record: Any,
-    state: Integers,
-    actions: Integers,
-    caused_events: Integers,
-    reward_by_mover: Floats,
-) -> int:
+def play_round(record, state, actions, caused_events, reward_by_mover):
     """Lets all agents move, each in its turn until the episode ends, and returns all events."""
     forget(caused_events, reward_by_mover)
     events = 0
     for agent in range(record.n_agents):
         events |= play_turn(record, state, actions[agent], caused_events, reward_by_mover)
-        if is_over(record, events) or is_cut_off(record, state):
+        if kernels.is_over(record, events) or kernels.is_cut_off(record, state):
             break
     return events
 
 
 @jitable
-def play_joint(
-    record: Any,
-    state: Integers,
-    actions: Integers,
-    caused_events: Integers,
-    reward_by_mover: Floats,
-) -> int:
+def play_joint(record, state, actions, caused_events, reward_by_mover):
     """Lets all agents move at once and returns all events."""
     forget(caused_events, reward_by_mover)
-    events = apply_joint(record, state, actions, caused_events)
+    events = kernels.apply_joint(record, state, actions, caused_events)
     for mover in range(record.n_agents):
         for agent in range(record.n_agents):
-            add_rewards(record, caused_events[mover], mover, agent, reward_by_mover[mover, agent])
+            kernels.add_rewards(
+                record, caused_events[mover], mover, agent, reward_by_mover[mover, agent]
+            )
     return events
 
 
@@ -136,7 +115,7 @@ def look(record: Any, state: Integers, sight: Sight, values: Integers, seen: Int
     for place in range(seen.shape[0]):
         agent = sight.agents[place]
         if agent != last:
-            observe(record, state, agent, values)
+            kernels.observe(record, state, agent, values)
             last = agent
         seen[place] = values[sight.columns[place]]
 
@@ -145,7 +124,7 @@ def look(record: Any, state: Integers, sight: Sight, values: Integers, seen: Int
 def allow(record: Any, state: Integers, allowed: Flags) -> None:
     """Writes the action masks of all agents (n_agents, n_actions)."""
     for agent in range(allowed.shape[0]):
-        bits = mask(record, state, agent)
+        bits = kernels.mask(record, state, agent)
         for action in range(allowed.shape[1]):
             allowed[agent, action] = bits >> action & 1
 
@@ -161,7 +140,7 @@ def play_one(
         batch.reward_by_mover[i],
     )
     if batch.over[i]:
-        reset(record, state, batch.streams[i])
+        kernels.reset(record, state, batch.streams[i])
         forget(caused_events, reward_by_mover)
         events = 0
     elif at_once:
@@ -170,8 +149,8 @@ def play_one(
         events = play_round(record, state, actions[i], caused_events, reward_by_mover)
     fresh = batch.over[i]
     batch.events[i] = events
-    batch.terminated[i] = not fresh and is_over(record, events)
-    batch.truncated[i] = not fresh and not batch.terminated[i] and is_cut_off(record, state)
+    batch.terminated[i] = not fresh and kernels.is_over(record, events)
+    batch.truncated[i] = not fresh and not batch.terminated[i] and kernels.is_cut_off(record, state)
     batch.over[i] = batch.terminated[i] or batch.truncated[i]
     look(record, state, sight, batch.values[i], batch.seen[i])
     allow(record, state, batch.allowed[i])

@@ -20,13 +20,8 @@ class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
     `caused_events` (names of those that the agent caused), `signals` (what it got, by reward
     signal) and `cycle_rewards` (what it got for each agent's move, in the order of the turns).
 
-    Args:
-        task: id of a task, or a task.
-        moves: "joint": all move at once; "turns": one after the other, as in `TurnsEnv`.
-        options: those of `AgentsInterface`, and of the task.
-
-    Raises:
-        InputError: an unknown task, option or name, or a value outside its valid set.
+    With the moves "joint" all move at once, with "turns" one after the other, as in `TurnsEnv`. All
+    other arguments are those of `AgentsInterface`.
     """
 
     def __init__(self, task: str | Task, *, moves: str = "joint", **options: Any) -> None:

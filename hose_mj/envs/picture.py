@@ -30,14 +30,7 @@ AGENT_COLORS: tuple[Rgb, ...] = (
 
 @dataclass(frozen=True)
 class Mark:
-    """Something that stands on a cell.
-
-    Attributes:
-        kind: `SOURCE`, `GOAL`, `STATION`, `ROBOT`, `TAXI` or `PASSENGER`.
-        at: where it stands.
-        label: its number or letter, in at most two characters.
-        color: red, green, blue, 0 to 255.
-    """
+    """Something that stands on a cell: its kind, place, label of at most two characters, colour."""
 
     kind: str
     at: Point
@@ -142,11 +135,9 @@ _FINE = 2  # drawn so many times larger
 
 
 def draw_picture(picture: Picture, cell: int | None = None) -> NDArray[np.uint8]:
-    """Returns the image of a picture, (height, width, 3).
+    """Returns the image of a picture, (height, width, 3); by default about 500 pixels wide.
 
-    Args:
-        picture: what is to be drawn.
-        cell: side of a cell (pixels); None for a grid about 500 pixels wide.
+    `cell` is the side of a cell (pixels).
     """
     if cell is None:
         cell = min(max(_WIDTH // picture.columns, 8), 96)
@@ -233,7 +224,8 @@ class _Sheet:
         pen, at, color, thin = self.pen, mark.at, mark.color, max(_FINE, self.cell // 20)
         label_at, label_size, label_color = at, 0.5, _PAPER
         if mark.kind in (STATION, GOAL):
-            pen.rectangle(self.box(at, 0.46), fill=_pale(color))
+            pale = tuple(round(0.72 * 255 + 0.28 * part) for part in color)
+            pen.rectangle(self.box(at, 0.46), fill=pale)
             label_color = color
         if mark.kind == STATION:
             label_at, label_size = (at[0] - 0.28, at[1] + 0.25), 0.3
@@ -264,8 +256,3 @@ def _load_font(size: int) -> Any:
     from PIL import ImageFont
 
     return ImageFont.load_default(size)
-
-
-def _pale(color: Rgb) -> Rgb:
-    red, green, blue = (round(0.72 * 255 + 0.28 * part) for part in color)
-    return red, green, blue

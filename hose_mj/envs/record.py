@@ -42,11 +42,7 @@ class Source(Protocol):
 
 
 class GridSource:
-    """The episodes of a task on a grid.
-
-    Args:
-        episode: of the environment.
-    """
+    """What the running episode of a task on a grid tells."""
 
     def __init__(self, episode: Episode) -> None:
         self._episode = episode
@@ -84,13 +80,7 @@ def find_source(env: Any) -> Source:
 
 
 class Recorder:
-    """Follows the episodes of a source and keeps some of them in a folder.
-
-    Args:
-        source: of an environment.
-        folder: where the recordings go.
-        keep: which stay.
-    """
+    """Follows the episodes of a source and keeps some of them in a folder."""
 
     def __init__(self, source: Source, folder: Path | str, keep: Keep | None) -> None:
         self._source, self._folder = source, RecordingFolder(Path(folder), keep)

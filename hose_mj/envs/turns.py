@@ -13,20 +13,13 @@ from hose_mj.tasks.kernels import Floats
 
 
 class TurnsEnv(AgentsInterface, AECEnv[str, Any, Any]):
-    """The agents of a task, each moving in its turn.
+    """The agents of a task, each moving in its turn; arguments are those of `AgentsInterface`.
 
     `infos[agent]` holds, about the moves since the agent's own last one (its own included):
     `action_mask` (int8), `events` (names of all that happened), `caused_events` (names of those
     that the agent caused), `signals` (what it got, by reward signal) and `cycle_rewards` (its
     reward of each of these moves, in order: equation 6.4 discounts within the cycle, `last()` does
     not).
-
-    Args:
-        task: id of a task, or a task.
-        options: those of `AgentsInterface`, and of the task.
-
-    Raises:
-        InputError: an unknown task, option or name, or a value outside its valid set.
     """
 
     metadata = {**AgentsInterface.metadata, "is_parallelizable": False}  # noqa: RUF012

@@ -125,13 +125,9 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
         return self._observe(), self._make_infos()
 
     def step(self, actions: Any) -> Result:
-        """Steps every copy, or starts its next episode.
+        """Steps every copy, or starts its next episode; actions are of `action_space`.
 
-        Args:
-            actions: of `action_space`.
-
-        Raises:
-            InputError: actions of another shape or out of range, or no reset before.
+        `InputError` is raised for actions of another shape or out of range, or no reset before.
         """
         if not self._begun:
             raise InputError.about("cannot step an episode that has not begun: call reset() first")

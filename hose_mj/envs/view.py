@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from gymnasium import spaces
 
 from hose_mj.envs import kernels
 from hose_mj.envs.episode import check_names
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.task import Task
 from hose_mj.tasks.variables import LARGEST_SIZE, Variable
 
 Form = Literal["array", "dict", "index"]
-FORMS = ("array", "dict", "index")
+FORMS = get_args(Form)
 
 
 class View:
@@ -44,7 +44,12 @@ class View:
     def __init__(
         self, task: Task, observe: Sequence[str] | None, form: Form, agents: Sequence[int]
     ) -> None:
-        entries = list_entries(choose_variables(task, observe), agents)
+        known = {variable.name: variable for variable in task.variables}
+        if observe is not None:
+            check_names("observe", observe, tuple(known))
+        check_choice("form", form, FORMS)
+        chosen = [known[name] for name in (known if observe is None else observe)]
+        entries = list_entries(chosen, agents)
         self.names = tuple(
             f"{task.agents[agent]}.{variable.name}"
             if variable.per_agent and len(agents) > 1
@@ -56,7 +61,7 @@ class View:
         columns = np.array([task.variables.index(variable) for _, variable in entries], np.int64)
         self.sight = kernels.Sight(seers, columns)
         self._values = np.zeros(len(task.variables), np.int64)
-        self.form = check_form(form)
+        self.form = form
         self._strides = np.ones(len(entries), np.int64)
         if form == "index":
             self._strides = self._make_strides(observe)
@@ -108,19 +113,3 @@ def list_entries(chosen: Sequence[Variable], agents: Sequence[int]) -> list[tupl
     shared = [(agents[0], variable) for variable in chosen if not variable.per_agent]
     own = [variable for variable in chosen if variable.per_agent]
     return shared + [(agent, variable) for agent in agents for variable in own]
-
-
-def choose_variables(task: Task, observe: Sequence[str] | None) -> tuple[Variable, ...]:
-    """Returns the named variables of a task; `InputError` for a wrong name."""
-    if observe is None:
-        return task.variables
-    known = {variable.name: variable for variable in task.variables}
-    check_names("observe", observe, tuple(known))
-    return tuple(known[name] for name in observe)
-
-
-def check_form(form: str) -> Form:
-    """Returns the form; `InputError` for an unknown one."""
-    if form not in FORMS:
-        raise InputError("form", form, f"one of {', '.join(FORMS)}")
-    return form  # type: ignore[return-value]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,12 +17,6 @@ def check_count(name: str, value: object, least: int, most: int | None = None) -
         end = f"at or above {least}" if most is None else f"from {least} to {most}"
         raise InputError(name, value, f"a whole number {end}")
     return count
-
-
-def check_choice(name: str, value: object, valid: Sequence[str]) -> None:
-    """Raises `InputError` unless `value` is one of the valid words."""
-    if value not in valid:
-        raise InputError(name, value, "one of " + ", ".join(valid))
 
 
 def check_arc_lengths(arc_length: ArrayLike, length: float, what: str = "arc_length") -> Array:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_choice, check_count, check_vector
+from hose_mj.errors import InputError, check_choice
+from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
 

@@ -108,14 +108,9 @@ def play_all(
     kept: EndingsFile,
     advance: Callable[[int], None],
 ) -> list[Ending]:
-    """Plays all sequences that are not kept yet, and keeps each.
+    """Plays all sequences of moves that are not kept yet, and keeps each.
 
-    Args:
-        make_world: makes the world, if it is needed.
-        sequences: of moves.
-        limits: that break.
-        kept: the endings so far, and where to.
-        advance: called with 1 after each sequence.
+    The world is made if it is needed; `advance` is called with 1 after each sequence.
     """
     endings = kept.read()[: len(sequences)]
     advance(len(endings))
@@ -142,11 +137,7 @@ class EndingsFile:
     settings: dict[str, Any]
 
     def read(self) -> list[Ending]:
-        """The endings kept so far.
-
-        Raises:
-            InputError: they are of other settings.
-        """
+        """The endings kept so far; `InputError` where they are of other settings."""
         if self.path is None or not self.path.exists():
             return []
         document = json.loads(self.path.read_bytes())

@@ -7,7 +7,7 @@ is watched.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -16,50 +16,27 @@ from scipy.interpolate import BSpline
 from hose_mj.constraints.kinds import KINDS
 from hose_mj.hoses.geds.basis import DEGREE, make_knots
 from hose_mj.hoses.protocol import Array
-from hose_mj.recording.scene_description import (
-    WORLD,
-    Geom,
-    KindStyle,
-    Margin,
-    Rgba,
-    SceneDescription,
-)
+from hose_mj.recording import scene_description, world_episode
+from hose_mj.recording.scene_description import WORLD, Geom, SceneDescription
 from hose_mj.recording.sinks import Sink
-from hose_mj.recording.world_episode import (
-    NO_TURN,
-    BreakMark,
-    EpisodeEnding,
-    SampleBuffer,
-    WorldEpisode,
-)
-from hose_mj.world.geds_world import GedsWorld
+from hose_mj.recording.world_episode import EpisodeEnding, SampleBuffer
+from hose_mj.world.scene_geoms import KIND_NAMES
 from hose_mj.world.world import World
 
-KIND_STYLES = tuple(KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
+KIND_STYLES = tuple(scene_description.KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
 N_POINTS = 81
 """Points along the hose that are recorded."""
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows geoms and sites of groups 0, 1 and 2
-_KINDS = {
-    int(mujoco.mjtGeom.mjGEOM_PLANE): "plane",
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
-    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
-    int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
-}
+_ELLIPSOID, _MESH = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID), int(mujoco.mjtGeom.mjGEOM_MESH)
+_KINDS = {**KIND_NAMES, _ELLIPSOID: "ellipsoid", _MESH: "mesh"}
 
 
 class SceneBodies:
     """The scene's bodies among those of a world, where `cable` and `flex` hoses have theirs too.
 
-    Args:
-        world: at its start.
-
-    Attributes:
-        model: the scene's own mjModel, without a hose.
-        data: its poses, those of the world's bodies.
-        bodies: ids in the world's model of the scene's bodies that move and are seen (B,).
+    `model` is the scene's own mjModel, without a hose, `data` has the poses of the world's bodies
+    at its start, and `bodies` (B,) are the ids in the world's model of those that move and are
+    seen.
     """
 
     def __init__(self, world: World) -> None:
@@ -96,8 +73,8 @@ class SceneBodies:
         number = self._numbers.index(body) if body in self._numbers else WORLD
         if number == WORLD:
             place(position, quaternion, self.data.xpos[body], self.data.xquat[body])
-        vertices, faces = read_mesh(model, int(model.geom_dataid[i]))
-        is_mesh = model.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH
+        is_mesh = model.geom_type[i] == _MESH
+        vertices, faces = read_mesh(model, int(model.geom_dataid[i])) if is_mesh else (None, None)
         return Geom(
             name=model.geom(i).name or f"{model.body(body).name} geom {i}",
             kind=_KINDS[int(model.geom_type[i])],
@@ -106,8 +83,8 @@ class SceneBodies:
             body=number,
             position=position,
             quaternion=quaternion,
-            vertices=vertices if is_mesh else None,
-            faces=faces if is_mesh else None,
+            vertices=vertices,
+            faces=faces,
         )
 
     def make_goal(self, name: str) -> Geom:
@@ -126,13 +103,10 @@ class SceneBodies:
 def describe_scene(
     world: World, monitor: Any | None, settings: Mapping[str, Any], n_points: int = N_POINTS
 ) -> tuple[SceneDescription, SceneBodies]:
-    """Describes the scene of a world as it stands now.
+    """Describes the scene of a world as it stands now, after its reset.
 
-    Args:
-        world: after its reset.
-        monitor: a `hose_mj.constraints.monitor.Monitor`; None where nothing is watched.
-        settings: shown beside the pictures.
-        n_points: points along the hose that are to be recorded.
+    The monitor is a `hose_mj.constraints.monitor.Monitor`, None where nothing is watched; settings
+    are shown beside the pictures, and `n_points` along the hose are to be recorded.
     """
     bodies, scene = SceneBodies(world), world.scene
     geoms = tuple(bodies.make_geom(i) for i in bodies.list_geoms())
@@ -162,27 +136,22 @@ def describe_scene(
 
 def read_control_points(world: World) -> Array:
     """Returns the control points of a spline hose, or the nodes of a chain, (C, 3), m."""
-    if isinstance(world, GedsWorld):
-        return world.hose.control_points
+    if world.hose_model == "geds":
+        return np.asarray(cast(Any, world).hose.control_points)
     return world.hose_position(world.centre_line().arc_lengths)
 
 
 class HoseReader:
-    """Reads where the hose is, at the same arc lengths again and again.
+    """Reads where the hose is, at the same rising arc lengths (P,), m, again and again.
 
     A spline hose is linear in its control points: a product replaces the search of its basis.
-
-    Args:
-        world: whose hose it is.
-        arc_lengths: rising (P,), m.
     """
 
     def __init__(self, world: World, arc_lengths: Array) -> None:
         self._arc_lengths = arc_lengths
         self._basis: Array | None = None
-        if isinstance(world, GedsWorld):
-            n = len(world.hose.control_points)
-            knots = make_knots(n, world.scene.spec.length)
+        if world.hose_model == "geds":
+            knots = make_knots(len(read_control_points(world)), world.scene.spec.length)
             self._basis = BSpline.design_matrix(arc_lengths, knots, DEGREE).toarray()
 
     def read(self, world: World) -> tuple[Array, Array]:
@@ -229,12 +198,12 @@ def compute_tension_limit(world: World, monitor: Any | None) -> float:
     return float(monitor.limits.compute_tension_limit(world.scene.spec, gravity))
 
 
-def list_margins(monitor: Any | None) -> tuple[Margin, ...]:
+def list_margins(monitor: Any | None) -> tuple[scene_description.Margin, ...]:
     """Returns what a monitor measures."""
     if monitor is None:
         return ()
     parts = zip(monitor.names, monitor.kinds, monitor.units, monitor.limit_texts, strict=True)
-    return tuple(Margin(*part) for part in parts)
+    return tuple(scene_description.Margin(*part) for part in parts)
 
 
 def place(position: Array, quaternion: Array, origin: Array, turn: Array) -> None:
@@ -245,7 +214,7 @@ def place(position: Array, quaternion: Array, origin: Array, turn: Array) -> Non
     position[:], quaternion[:] = origin + moved, turned
 
 
-def find_color(model: mujoco.MjModel, geom: int) -> Rgba:
+def find_color(model: mujoco.MjModel, geom: int) -> scene_description.Rgba:
     """Returns a geom's colour; where a material has a texture, times the texture's mean."""
     material = int(model.geom_matid[geom])
     if material < 0:
@@ -260,16 +229,14 @@ def find_color(model: mujoco.MjModel, geom: int) -> Rgba:
     return to_bytes(rgba)
 
 
-def to_bytes(rgba: Array) -> Rgba:
+def to_bytes(rgba: Array) -> scene_description.Rgba:
     """Returns a colour of numbers from 0 to 1 as integers from 0 to 255."""
     red, green, blue, opacity = (int(x) for x in np.rint(255.0 * np.clip(rgba, 0.0, 1.0)))
     return red, green, blue, opacity
 
 
-def read_mesh(model: mujoco.MjModel, mesh: int) -> tuple[Array | None, Array | None]:
-    """Returns vertices (v, 3) and triangles (f, 3) of a mesh; None, None without one."""
-    if mesh < 0:
-        return None, None
+def read_mesh(model: mujoco.MjModel, mesh: int) -> tuple[Array, Array]:
+    """Returns vertices (v, 3) and triangles (f, 3) of a mesh."""
     vertex, face = int(model.mesh_vertadr[mesh]), int(model.mesh_faceadr[mesh])
     vertices = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[mesh])]
     faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]
@@ -347,7 +314,7 @@ class Capture:
             margins = monitor.measure() if monitor is not None else np.zeros(0)
         numbers = {
             "time": world.time,
-            "turn": info.get("turn", NO_TURN),
+            "turn": info.get("turn", world_episode.NO_TURN),
             "reward": info.get("reward", 0.0),
             "margins": margins,
             **self._read(world),
@@ -358,9 +325,8 @@ class Capture:
     def finish(self, outcome: Any = None) -> None:
         """Ends the episode.
 
-        Args:
-            outcome: has `ended_by`, a text, and `broken`, a `Break` or None; None if the episode
-                was stopped.
+        `outcome` has `ended_by`, a text, and `broken`, a `Break` or None; it is None if the episode
+        was stopped.
         """
         if self.scene is None or self._outcome is not None:
             return
@@ -370,11 +336,11 @@ class Capture:
         for sink in self._sinks:
             sink.end(self._outcome)
 
-    def episode(self) -> WorldEpisode:
+    def episode(self) -> world_episode.WorldEpisode:
         """Returns the episode that has ended, where `keep` was asked for and there are samples."""
         assert self._kept is not None, "made with keep=True, and started"
         assert self.scene is not None
-        return WorldEpisode(
+        return world_episode.WorldEpisode(
             self.scene, self._kept.copy(), self._outcome or EpisodeEnding("running")
         )
 
@@ -410,11 +376,11 @@ class Capture:
             sink.add(samples)
 
 
-def make_mark(broken: Any | None) -> BreakMark | None:
+def make_mark(broken: Any | None) -> world_episode.BreakMark | None:
     """Turns a `Break` into what a recording shows of it."""
     if broken is None:
         return None
-    return BreakMark(
+    return world_episode.BreakMark(
         broken.kind,
         broken.time,
         np.array(broken.place),

@@ -44,15 +44,8 @@ class WorldPhysics(dm_mujoco.Physics):
 
     `model` and `data` are copies for the eye: a scene's bodies and, where the hose is a spline, a
     row of capsules that follow it. They are brought up to date after every step, and nothing that
-    is written to them reaches the world; `set_control` does.
-
-    Args:
-        world: stepped.
-        monitor: of the world; asked after every step.
-
-    Attributes:
-        world, monitor: as given.
-        broken: the first break since the reset; None before one. Steps end there.
+    is written to them reaches the world; `set_control` does. `broken` is the first break that the
+    monitor has found since the reset; steps end there.
     """
 
     def __init__(self, world: World, monitor: Monitor) -> None:
@@ -79,11 +72,7 @@ class WorldPhysics(dm_mujoco.Physics):
         self._show()
 
     def reset(self, keyframe_id: int | None = None) -> None:
-        """Returns to the start of the scene; it has no other start.
-
-        Raises:
-            InputError: a keyframe.
-        """
+        """Returns to the start of the scene, the only one; `InputError` for a keyframe."""
         if keyframe_id is not None:
             raise InputError(
                 "keyframe_id", keyframe_id, "None: a world starts where its scene does"

@@ -53,10 +53,8 @@ class Observer(Protocol):
     def sample(self, world: World, monitor: Monitor, info: Mapping[str, Any]) -> None:
         """Called at the start, then at the sampling rate, and at the end.
 
-        Args:
-            world: as it stands.
-            monitor: has just checked it.
-            info: what `Policy.describe` says, and `margins`, those of the monitor.
+        The monitor has just checked the world; `info` is what `Policy.describe` says, and
+        `margins`.
         """
         ...
 
@@ -67,14 +65,9 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How an episode ended, and how long it took.
+    """How an episode ended, with which break, if any, and how long it took, simulated (s).
 
-    Attributes:
-        steps: of the world.
-        sim_time: simulated (s).
-        ended_by: "break", "goal" or "duration".
-        broken: the break that ended it; None where none did.
-        stalled: actions that robots gave up.
+    `stalled` counts the actions that robots gave up.
     """
 
     steps: int

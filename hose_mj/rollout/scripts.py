@@ -7,14 +7,14 @@ the likeliest first, from a scene's geometry.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
+import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from hose_mj.hoses.protocol import Array
-from hose_mj.rollout.obstacles import Obstacles, compute_reach
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
@@ -52,13 +52,9 @@ def relax(formation: Array, fixed: int, source: Array, spans: Array) -> Array:
     """Draws robots together until no two neighbours, the source included, are too far apart.
 
     Passes up and down the hose alternate, as in Aristidou and Lasenby's FABRIK (2011), but with
-    lengths that are limits: they end at such a formation where there is one.
-
-    Args:
-        formation: places of the sites (N, 3), m.
-        fixed: the robot that stays.
-        source: where the hose begins (3,), m.
-        spans: how far each robot may be from the next one along the hose (N,), m.
+    lengths that are limits: they end at such a formation where there is one. The sites are at (N,
+    3), m, the robot `fixed` stays; `spans` are how far each may be from the next one along the hose
+    (N,), m.
     """
     chain = np.concatenate([formation, source[None]])
     n = len(formation)
@@ -84,13 +80,7 @@ _PASSES = 20
 class Player:
     """Drives the robots of a world through a script, then holds them at its end.
 
-    Args:
-        driver: of the world.
-        script: its formations.
-
-    Attributes:
-        script: as given.
-        time: when the targets are at its end (s).
+    `time` is when the targets are at its end (s).
     """
 
     def __init__(self, driver: Driver, script: Script) -> None:
@@ -106,15 +96,12 @@ class Player:
     def update(self) -> None:
         """Writes the controls of the next step."""
         elapsed = self._driver.world.time - self._begun
-        self._driver.drive_to(_interpolate(elapsed, self._times, self._formations))
+        times, formations = self._times, self._formations
+        k = min(int(np.searchsorted(times, elapsed, side="right")), len(times) - 1)
+        span = times[k] - times[k - 1]
+        share = min(1.0, (elapsed - times[k - 1]) / span) if span > 0.0 else 1.0
+        self._driver.drive_to((1.0 - share) * formations[k - 1] + share * formations[k])
         self._driver.update()
-
-
-def _interpolate(time: float, times: Array, formations: Sequence[Array] | Array) -> Array:
-    k = min(int(np.searchsorted(times, time, side="right")), len(times) - 1)
-    span = times[k] - times[k - 1]
-    share = min(1.0, (time - times[k - 1]) / span) if span > 0.0 else 1.0
-    return np.asarray((1.0 - share) * formations[k - 1] + share * formations[k])
 
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
@@ -311,3 +298,76 @@ def _turn(vector: Array, angle: float) -> Array:
     """A vector turned about the vertical."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]])
+
+
+class Obstacles:
+    """Distances of a robot to the scene around it, at the state that the world is in.
+
+    Planes that face up are floors and stand in nobody's way, nor does what the robot stands on or
+    touches at the start.
+    """
+
+    def __init__(self, world: World, robot: int) -> None:
+        model = world.model
+        self._model = model
+        self._data = mujoco.MjData(model)
+        self._data.qpos[:] = world.data.qpos
+        mujoco.mj_kinematics(model, self._data)
+        self.geoms = find_solid(world, np.asarray(world.robot_bodies[robot]))
+        self._own = np.array(self._data.geom_xpos[self.geoms])
+        moving = np.concatenate(world.robot_bodies)
+        fixed = np.flatnonzero(model.body_weldid == 0)
+        fixed = np.setdiff1d(fixed, moving)
+        self.others = np.array(
+            [g for g in find_solid(world, fixed) if not self._is_ground(int(g))], np.int64
+        )
+
+    def measure(self, offset: Array, most: float) -> float:
+        """Clearance (m) of the robot moved by an offset (3,); `most` where it is larger."""
+        return min((self.find(int(g), offset, most)[0] for g in self.others), default=most)
+
+    def find(self, obstacle: int, offset: Array, most: float) -> tuple[float, Array]:
+        """Clearance (m) to one obstacle, and the vector (3,) to it from the robot moved."""
+        data, model = self._data, self._model
+        data.geom_xpos[self.geoms] = self._own + offset
+        best, towards = most, np.zeros(3)
+        ends = np.zeros(6)
+        for geom in self.geoms:
+            reach = model.geom_rbound[geom] + model.geom_rbound[obstacle] + best
+            apart = data.geom_xpos[geom] - data.geom_xpos[obstacle]
+            if model.geom_rbound[obstacle] > 0.0 and apart @ apart > reach * reach:
+                continue
+            distance = mujoco.mj_geomDistance(model, data, int(geom), obstacle, best, ends)
+            if distance < best:
+                best, towards = distance, ends[3:] - ends[:3]
+        return best, towards
+
+    def _is_ground(self, geom: int) -> bool:
+        if self._model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE:
+            return self.find(geom, np.zeros(3), 1e-3)[0] < 1e-3
+        return bool(self._data.geom_xmat[geom, 8] > 0.7)
+
+
+def find_solid(world: World, bodies: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The geoms of some bodies that collide with anything."""
+    model = world.model
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return np.flatnonzero(solid & np.isin(model.geom_bodyid, bodies))
+
+
+def compute_reach(world: World, robot: int) -> float:
+    """Returns how far (m) a robot's colliding geoms reach around its site, seen from above."""
+    model, data = world.model, world.data
+    site = data.site_xpos[world.sites[robot], :2]
+    reach = 0.0
+    for geom in find_solid(world, np.asarray(world.robot_bodies[robot])):
+        away = float(np.linalg.norm(data.geom_xpos[geom, :2] - site))
+        if model.geom_type[geom] in (_CYLINDER, _ELLIPSOID):
+            away += float(model.geom_size[geom, 0])
+        else:
+            away += float(np.linalg.norm(model.geom_aabb[geom, 3:5]))
+        reach = max(reach, away)
+    return reach
+
+
+_CYLINDER, _ELLIPSOID = mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_ELLIPSOID

@@ -113,14 +113,9 @@ def choose_camera(model: mujoco.MjModel, camera: str | None) -> Any:
 
 
 class PosedBodies:
-    """Puts a scene's bodies where a sample has them, without simulating anything.
+    """Puts a scene's bodies where a sample of an episode has them, without simulating anything.
 
-    Args:
-        model: of the scene, without a hose.
-        episode: recorded in it.
-
-    Attributes:
-        data: holds the poses.
+    The model is the scene's, without a hose; `data` holds the poses.
     """
 
     def __init__(self, model: mujoco.MjModel, episode: WorldEpisode) -> None:

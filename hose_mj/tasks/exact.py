@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from hose_mj.errors import InputError
 from hose_mj.tasks import kernels
-from hose_mj.tasks.kernels import STEPS, TURN, Floats, Integers
-from hose_mj.tasks.search import NOT_FOUND, TOO_MANY, search
+from hose_mj.tasks.kernels import NOT_FOUND, STEPS, TOO_MANY, TURN, Floats, Integers
 from hose_mj.tasks.task import Task
 
 OVER = -1
@@ -54,15 +53,9 @@ class Model:
 
 
 def enumerate_turns(task: Task, starts: Iterable[Integers], limit: int = 10**6) -> Model:
-    """Writes out what agents that move in turn, or a single one, can reach.
+    """Writes out what agents that move in turn, or a single one, can reach from the starts.
 
-    Args:
-        task: the task.
-        starts: the initial states.
-        limit: largest number of states.
-
-    Raises:
-        InputError: more states than the limit.
+    `InputError` is raised for more states than the limit.
     """
     rewards = np.zeros(len(task.rewards))
 
@@ -180,25 +173,15 @@ def solve(
 
 
 def find_shortest(task: Task, state: Integers, limit: int = 4_000_000) -> int | None:
-    """Returns the fewest moves of single agents, in turns, from a state to the goal.
+    """Returns the fewest moves of single agents, in turns, from a state to the goal, or None.
 
-    The step limit plays no part in it.
-
-    Args:
-        task: a compiled `Task` without chance.
-        state: where the search starts; its turn counts.
-        limit: most states to visit.
-
-    Returns:
-        The number of moves, or None if the goal cannot be reached.
-
-    Raises:
-        InputError: more states than the limit.
+    The task is compiled and without chance; the state's turn counts, the step limit plays no part.
+    `InputError` is raised for more states than the limit.
     """
     width = len(state)
     slots = 1 << int(np.ceil(np.log2(2 * limit)))
     states = np.zeros((limit, width), np.int16)
-    moves = search(
+    moves = kernels.search(
         task.kernel, state.copy(), states, np.full(slots, -1, np.int32), np.zeros(width, np.int64)
     )
     if moves == TOO_MANY:

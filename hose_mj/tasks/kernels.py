@@ -90,11 +90,8 @@ def apply(record: Any, state: Integers, agent: int, action: int) -> int:
 def apply_joint(record: Any, state: Integers, actions: Integers, caused_events: Integers) -> int:
     """Lets all agents move at once and returns all events.
 
-    Args:
-        record: the task's kernel record.
-        state: advanced in place; the turn goes back to agent 0.
-        actions: one for each agent (n_agents,).
-        caused_events: the events that each agent caused (n_agents,), written in place.
+    The state is advanced in place, the turn goes back to agent 0. There is an action for each agent
+    (n_agents,); the events that each caused are written to `caused_events` (n_agents,).
     """
     raise NotImplementedError(type(record).__name__)
 
@@ -196,10 +193,8 @@ def compute_safe_mask(record: Any, state: Integers, agent: int, scratch: Integer
 class Projection(NamedTuple):
     """A set of variables as one mixed-radix number; made by `variables.make_projection`.
 
-    Attributes:
-        columns: the variables' places among all (k,), the fastest running one last.
-        strides: what a step of each adds to the index (k,).
-        size: number of different indices.
+    The variables' places among all (k,), the fastest running one last; what a step of each adds to
+    the index (k,); and the number of different indices.
     """
 
     columns: Integers
@@ -227,13 +222,9 @@ def run_random(
 ) -> None:
     """Plays random moves, agents in turn, observing before each one; for timing and tests.
 
-    Args:
-        record: the task's kernel record.
-        state: an initial state, advanced in place through as many episodes as it takes.
-        stream: random numbers for the actions and the resets.
-        n_moves: number of moves.
-        values: work array of the observed values (n_variables,).
-        counts: raised in place: episodes ended, successes, violations, sum of all values (4,).
+    The state, an initial one, is advanced through as many episodes as it takes. `values` is a work
+    array (n_variables,); `counts` are raised: episodes ended, successes, violations, sum of all
+    values (4,).
     """
     episodes = successes = violations = total = 0
     for _ in range(n_moves):
@@ -251,3 +242,62 @@ def run_random(
     counts[1] += successes
     counts[2] += violations
     counts[3] += total
+
+
+Shorts = npt.NDArray[np.int16]
+Slots = npt.NDArray[np.int32]
+
+NOT_FOUND, TOO_MANY = -1, -2
+
+
+@jitable
+def find_slot(states: Shorts, slots: Slots, state: Integers) -> int:
+    """Returns the slot of a state, or the free one where it belongs; its step count is left out."""
+    mixed = 0
+    for k in range(state.shape[0]):
+        if k != STEPS:
+            mixed = (mixed * 1_000_003 + state[k]) & 0xFFFFFFFFFFF
+    slot = (mixed >> 20 ^ mixed) & (slots.shape[0] - 1)
+    while slots[slot] >= 0:
+        same = True
+        for k in range(state.shape[0]):
+            same = same and (k == STEPS or states[slots[slot], k] == state[k])
+        if same:
+            break
+        slot = (slot + 1) & (slots.shape[0] - 1)
+    return slot
+
+
+@compiled
+def search(task: Any, start: Integers, states: Shorts, slots: Slots, state: Integers) -> int:
+    """Returns the moves to the goal; `states` is the queue, in which a step count is a depth."""
+    used = 1
+    for k in range(start.shape[0]):
+        states[0, k] = start[k]
+    states[0, STEPS] = 0
+    slots[find_slot(states, slots, start)] = 0
+    done = 0
+    while done < used:
+        agent = states[done, TURN]
+        for action in range(task.n_actions):
+            for k in range(state.shape[0]):
+                state[k] = states[done, k]
+            if not mask(task, state, agent) >> action & 1:
+                continue
+            events = apply(task, state, agent, action)
+            depth = states[done, STEPS] + 1
+            if events & task.success:
+                return depth
+            if is_over(task, events):
+                continue
+            slot = find_slot(states, slots, state)
+            if slots[slot] < 0:
+                if used == states.shape[0]:
+                    return TOO_MANY
+                for k in range(state.shape[0]):
+                    states[used, k] = state[k]
+                states[used, STEPS] = depth
+                slots[slot] = used
+                used += 1
+        done += 1
+    return NOT_FOUND

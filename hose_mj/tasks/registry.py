@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING, Any, cast
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.plugins import find_plugins, load_plugin
 
 if TYPE_CHECKING:
@@ -164,8 +164,7 @@ def make_task(id: str, **settings: Any) -> Task:
     kind = getattr(module, entry.settings)
     options = [f.name for f in dataclasses.fields(kind) if f.name not in entry.presets]
     for name in settings:
-        if name not in options:
-            raise InputError(f"option of {id}", name, "one of " + ", ".join(options))
+        check_choice(f"option of {id}", name, options)
     made = kind(**{**entry.defaults, **settings, **entry.presets})
     task = getattr(module, entry.factory)(made)
     return cast("Task", dataclasses.replace(task, id=id))

@@ -133,10 +133,8 @@ def make_reward_table(
 ) -> Floats:
     """Makes the reward of every set of events, by signal (2^n_events, n_signals).
 
-    Args:
-        events: names of the events, bit 0 first.
-        rewards: for each signal, what an event is worth; an event that is not named is worth 0,
-            and the reward of a set is the sum over its events.
+    `rewards` has for each signal what an event (bit 0 first) is worth, 0 if it is not named; the
+    reward of a set is the sum over its events.
     """
     values = np.array([[signal.get(name, 0.0) for signal in rewards.values()] for name in events])
     sets = np.array([bits[::-1] for bits in product((0.0, 1.0), repeat=len(events))])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Projection
 
 LARGEST_SIZE = 2**62
@@ -16,13 +16,9 @@ LARGEST_SIZE = 2**62
 
 @dataclass(frozen=True)
 class Variable:
-    """One state variable.
+    """One state variable, whose values are 0 .. cardinality - 1; their meaning is in words.
 
-    Attributes:
-        name: its name, the thesis's where there is one.
-        cardinality: its values are 0 .. cardinality - 1.
-        meaning: what the values say, in words.
-        per_agent: whether each agent sees a value of its own.
+    `per_agent` says whether each agent sees a value of its own.
     """
 
     name: str
@@ -46,8 +42,7 @@ def make_projection(variables: Sequence[Variable], names: Iterable[str]) -> Proj
     names = list(names)
     places = {variable.name: place for place, variable in enumerate(variables)}
     for name in names:
-        if name not in places:
-            raise InputError("variable", name, "one of " + ", ".join(places))
+        check_choice("variable", name, places)
         if names.count(name) > 1:
             raise InputError("variables", names, f"{name!r} only once")
     columns = [places[name] for name in names]

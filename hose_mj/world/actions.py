@@ -13,8 +13,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_choice, check_count
+from hose_mj.errors import InputError, check_choice
+from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
@@ -144,18 +144,15 @@ class Actions:
             if self.mode == "force":
                 ended = elapsed >= self._force_time - 0.5 * self.world.timestep
             else:
-                arrived = elapsed > 0.0 and self._has_arrived(self.robot)
+                driver, robot = self.driver, self.robot
+                is_near = elapsed > 0.0 and driver.compute_error(robot) <= self.tolerance
+                arrived = is_near and driver.compute_speed(robot) <= self.slowness
                 self.stalled = not arrived and elapsed >= self.patience
                 self.n_stalled += self.stalled
                 ended = arrived or self.stalled
             if ended:
                 self._end()
         return not self._runs
-
-    def _has_arrived(self, robot: int) -> bool:
-        if self.driver.compute_error(robot) > self.tolerance:
-            return False
-        return self.driver.compute_speed(robot) <= self.slowness
 
     def describe(self) -> dict[str, Any]:
         """The turn, its owner and what it does, for recordings."""

@@ -9,9 +9,8 @@ import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.cable import BallJoints
-from hose_mj.hoses.mujoco.chain_layout import ChainLayout, transport_frames
-from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
 from hose_mj.scenes.mjcf.scene import Scene
@@ -49,6 +48,7 @@ class CableWorld(MujocoWorld):
     """
 
     hose_model = "cable"
+    _advice = "try more substeps, fewer segments or a lower torsional stiffness"
 
     def __init__(
         self,
@@ -65,32 +65,31 @@ class CableWorld(MujocoWorld):
         check_count("segments", segments, 2)
         timestep = scene.timestep if timestep is None else timestep
         check_number("timestep", timestep)
-        self._layout = ChainLayout(spec.length, segments)
+        self._layout = chain_layout.ChainLayout(spec.length, segments)
         self._kind = BallJoints(spec, twist)
-        self._held = self._locate_holds(scene)
+        arcs = np.array([*(robot.arc_length for robot in scene.robots), 0.0])
+        index, along = self._layout.locate(arcs)
+        if len(set(index.tolist())) < len(index):
+            valid = "so many that each robot, and the source, holds one of its own"
+            raise InputError("segments", segments, valid)
+        self._held = list(zip(index.tolist(), along.tolist(), strict=True))
         if substeps is None:
             stable = compute_stable_step(spec, self._layout.segment_length, twist)
             most = min(_LONGEST, _SAFETY * stable)
             substeps = math.ceil(timestep / most * (1.0 - 1e-9))
         nodes = self._layout.nodes.copy()
         nodes[-1] = spec.length
+        self._tension_places = nodes[1:-1]
         super().__init__(scene, nodes, Numerics(timestep, substeps, "discrete", "sparse"))
-
-    def _locate_holds(self, scene: Scene) -> list[tuple[int, float]]:
-        """Segment of each attachment and the distance from its first node (m)."""
-        arcs = np.array([*(robot.arc_length for robot in scene.robots), 0.0])
-        index, along = self._layout.locate(arcs)
-        if len(set(index.tolist())) < len(index):
-            valid = "so many that each robot, and the source, holds one of its own"
-            raise InputError("segments", self._layout.segments, valid)
-        return list(zip(index.tolist(), along.tolist(), strict=True))
 
     def _make_hose(
         self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
     ) -> mujoco.MjSpec:
         maker, bodies = self._kind.make_chain(self._layout, None)
         h = self._layout.segment_length
-        ChainMass.of_hose(self._layout, spec.linear_density, spec.outer_radius).write(bodies)
+        chain_layout.ChainMass.of_hose(self._layout, spec.linear_density, spec.outer_radius).write(
+            bodies
+        )
         for body, bit in zip(bodies, contact.bits, strict=True):
             for geom in body.geoms:
                 contact.write(geom, int(bit))
@@ -118,40 +117,27 @@ class CableWorld(MujocoWorld):
         model.stat.meaninertia = scale
 
     def _set_nodes(self, nodes: Array) -> None:
-        frames = transport_frames(nodes, self._kind.base_frame)
+        frames = chain_layout.transport_frames(nodes, self._kind.base_frame)
         first = self.model.jnt_qposadr[self.model.body_jntadr[self.hose_bodies[0]]]
         qpos = self._kind.to_qpos(nodes[0], frames, rooted=False)
         self.data.qpos[first : first + len(qpos)] = qpos
 
-    def _read_motion(self) -> ChainMotion:
-        return ChainMotion.read(self.model, self.data, self._layout, self.hose_bodies)
+    def _read_motion(self) -> chain_layout.ChainMotion:
+        return chain_layout.ChainMotion.read(self.model, self.data, self._layout, self.hose_bodies)
 
     def _read_tensions(self) -> Array:
         mujoco.mj_rnePostConstraint(self.model, self.data)
         return self._read_motion().joint_tensions(self.data, self.hose_bodies)
-
-    @property
-    def _tension_places(self) -> Array:
-        return self.nodes[1:-1]
-
-    @property
-    def _advice(self) -> str:
-        return "try more substeps, fewer segments or a lower torsional stiffness"
 
 
 def compute_stable_step(spec: HoseSpec, segment_length: float, torsional_stiffness: float) -> float:
     """Largest stable step (s) of a free chain of rigid links with explicit joint stiffness.
 
     Undamped, 2 / omega for the fastest motion of bending or twist (docs/mujoco_cable.md, "Time
-    step"). Damping taken implicitly, with a relaxation time T, bears
-    dt = T + sqrt(T^2 + (2 / omega)^2): Jury's condition for v' = (v - dt omega^2 x) /
-    (1 + dt omega^2 T), x' = x + dt v'. A ball joint has one damping, tau EI / h, so of the twist
-    T is tau EI / GJ.
-
-    Args:
-        spec: the hose.
-        segment_length: h (m).
-        torsional_stiffness: GJ (N m^2).
+    step"), by h (m), EI and GJ (N m^2). Damping taken implicitly, with a relaxation time T, bears
+    dt = T + sqrt(T^2 + (2 / omega)^2): Jury's condition for v' = (v - dt omega^2 x) / (1 + dt
+    omega^2 T), x' = x + dt v'. A ball joint has one damping, tau EI / h, so of the twist T is tau
+    EI / GJ.
     """
     h, density, stiffness = segment_length, spec.linear_density, spec.bending_stiffness
     bend = h**2 / (2.0 * math.sqrt(3.0)) * math.sqrt(density / stiffness)

@@ -24,6 +24,10 @@ BANDWIDTH = 60.0
 """Of the servos that move a site directly (1/s): within 10 % of a step after 0.065 s."""
 BRAKING = 5.0
 """Braking (m/s^2) that stops a robot within half a cell: what the highest speed comes from."""
+_DRIVABLE = (
+    "motors that move its site in x and y, or two that turn parallel wheels of one body; else set "
+    "world.control yourself"
+)
 
 
 class Driver:
@@ -45,6 +49,7 @@ class Driver:
         targets: where the sites are to be (N, 3), m; at first where they are.
         speed: highest speed (m/s).
         axes: along how many axes each robot is driven (N,): 3 or, in the plane, 2.
+        wheeled: numbers of the robots that steer.
 
     Raises:
         InputError: an actuator that is no motor, a robot that neither servo can drive, a number
@@ -63,7 +68,7 @@ class Driver:
         self.world, self.speed = world, speed
         self.targets = world.site_positions()[:-1]
         self.axes = np.full(world.n_robots, 2)
-        self._wheeled: list[int] = []
+        self.wheeled: tuple[int, ...] = ()
         sliding: list[Motors] = []
         servos: list[ArmServo | WheelServo | SlideServo] = []
         self._motors = find_motors(world)
@@ -78,27 +83,20 @@ class Driver:
                 else:
                     servos.append(ArmServo(world, chain, bandwidth, speed))
             elif WheelServo.fits(world, wheels):
-                self._wheeled.append(motors.robot)
+                self.wheeled += (motors.robot,)
                 servos.append(WheelServo(world, wheels, speed))
             else:
-                raise _refuse(world, motors)
+                names = [world.model.actuator(int(i)).name or str(i) for i in motors.ids]
+                name = world.scene.robots[motors.robot].name
+                raise InputError(f"motors of robot {name}", names, _DRIVABLE)
         if sliding:
             servos.append(SlideServo(world, sliding, bandwidth, speed))
         self._servos = tuple(servos)
 
-    @property
-    def wheeled(self) -> tuple[int, ...]:
-        """Numbers of the robots that steer."""
-        return tuple(self._wheeled)
-
     def drive_to(self, targets: ArrayLike) -> None:
-        """Sets where the robots' sites are to be.
+        """Sets where the robots' sites are to be (N, 3), m; one driven in the plane ignores z.
 
-        Args:
-            targets: (N, 3), m; a robot driven in the plane ignores z.
-
-        Raises:
-            InputError: another shape, or numbers that are not finite.
+        `InputError` is raised for another shape, or numbers that are not finite.
         """
         try:
             wanted = np.asarray(targets, dtype=np.float64)
@@ -129,13 +127,3 @@ class Driver:
         rows = np.zeros((3, world.model.nv))
         mujoco.mj_jacSite(world.model, world.data, rows, None, int(world.sites[robot]))
         return float(np.linalg.norm((rows @ world.data.qvel)[: self.axes[robot]]))
-
-
-def _refuse(world: World, motors: Motors) -> InputError:
-    names = [world.model.actuator(int(i)).name or str(i) for i in motors.ids]
-    valid = (
-        "motors that move its site in x and y, or two that turn parallel wheels of one body; "
-        "else set world.control yourself"
-    )
-    robot = world.scene.robots[motors.robot]
-    return InputError(f"motors of robot {robot.name}", names, valid)

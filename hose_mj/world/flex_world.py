@@ -37,6 +37,7 @@ class FlexWorld(MujocoWorld):
     """
 
     hose_model = "flex"
+    _advice = "try a smaller timestep, or more substeps"
 
     def __init__(
         self,
@@ -52,11 +53,13 @@ class FlexWorld(MujocoWorld):
         length = scene.spec.length
         self._layout = FlexLayout.of_holds(length, segments, holds, clamp_correction=False)
         self._held = [int(self._layout.find_vertices(hold)[0]) for hold in holds]
-        self._rest = np.zeros((len(self._layout.nodes), 3))
-        self._rest[:, 0] = self._layout.nodes
+        nodes = self._layout.nodes
+        self._tension_places = (nodes[:-1] + nodes[1:]) / 2
+        self._rest = np.zeros((len(nodes), 3))
+        self._rest[:, 0] = nodes
         timestep = scene.timestep if timestep is None else timestep
         numerics = Numerics(timestep, substeps, "discrete", "sparse")
-        super().__init__(scene, self._layout.nodes, numerics)
+        super().__init__(scene, nodes, numerics)
 
     def stretch(self) -> Array:
         """Strain of the edges (K,); 0 if MuJoCo's constraints were rigid."""
@@ -90,11 +93,3 @@ class FlexWorld(MujocoWorld):
     def _read_tensions(self) -> Array:
         edges = find_rows(self.data, self.model.equality(f"{PREFIX}edges").id)
         return np.array(-self.data.efc_force[edges])
-
-    @property
-    def _tension_places(self) -> Array:
-        return np.asarray((self.nodes[:-1] + self.nodes[1:]) / 2)
-
-    @property
-    def _advice(self) -> str:
-        return "try a smaller timestep, or more substeps"

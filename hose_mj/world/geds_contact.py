@@ -27,15 +27,9 @@ _PROBE_RADIUS = 1e-4
 class GedsContact:
     """Hands a scene's geoms to a spline hose as obstacles, and what it does to them to MuJoCo.
 
-    Args:
-        model, data: MuJoCo's, poses as at the start.
-        hose: the hose.
-        sites, arc_lengths: as in `World`.
-
-    Attributes:
-        geoms: what may be touched.
-        pushes: what the hose has done in the last step to each of `geoms.moving`, force and moment
-            about the geom's position, (k, 6), N, N m.
+    Poses are as at the start. `geoms` are what may be touched; `pushes` is what the hose has done
+    in the last step to each of `geoms.moving`, force and moment about the geom's position, (k, 6),
+    N, N m.
     """
 
     def __init__(
@@ -178,13 +172,10 @@ def add_probe(spec: mujoco.MjSpec) -> None:
 
 
 class GeomMeter:
-    """Measures points against some geoms of a model.
+    """Measures points against some geoms (M,) of a model that has the geom of `add_probe`.
 
-    Args:
-        model: with the geom of `add_probe`.
-        geoms: ids, (M,).
-        touched: whether each geom counts at each of the points, (M, Q).
-        reach: beyond this distance nothing is measured (m).
+    `touched` (M, Q) says whether each geom counts at each of the points; beyond `reach` (m) nothing
+    is measured.
     """
 
     def __init__(

@@ -250,12 +250,7 @@ _SKIPPED = int(mujoco.mjtStage.mjSTAGE_VEL)
 
 
 class Bodies:
-    """The bodies of one mjModel under MuJoCo's integrator implicitfast.
-
-    Args:
-        model, data: MuJoCo's.
-        sites: ids of the sites where forces act, (k,).
-    """
+    """The bodies of one mjModel under MuJoCo's implicitfast; forces act at the sites (k,)."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, sites: np.ndarray) -> None:
         self._model, self._data, self._sites = model, data, [int(site) for site in sites]
@@ -318,12 +313,9 @@ class Bodies:
         """Returns by how much F (N) moves the sites against it in the step, (3 k, 3 k), m/N.
 
         Contacts, limits and other constraints of the last step tried go on to act, and give way as
-        MuJoCo lets them.
-
-        Args:
-            is_exact: True for the derivative at the last step tried: forces act on the pose at the
-                beginning of the step and are seen on that at its end, so it is not symmetric where
-                bodies turn. False for the symmetric one without the turn, which every step can do.
+        MuJoCo lets them. Exact is the derivative at the last step tried: forces act on the pose at
+        the beginning of the step and are seen on that at its end, so it is not symmetric where
+        bodies turn. Otherwise it is the symmetric one without the turn, which every step can do.
         """
         model, data = self._model, self._data
         dt = model.opt.timestep

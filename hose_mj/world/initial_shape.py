@@ -68,18 +68,6 @@ def relax_initial_shape(
     return hose
 
 
-def make_initial_shape(
-    spec: HoseSpec,
-    places: Array,
-    arc_lengths: Array,
-    obstacles: Sequence[Obstacle],
-    gravity: Array,
-) -> Array:
-    """Returns points of `relax_initial_shape` spread evenly from arc length 0 to L, (257, 3), m."""
-    hose = relax_initial_shape(spec, places, arc_lengths, obstacles, gravity)
-    return hose.position(np.linspace(0.0, spec.length, N_POINTS))
-
-
 def _draw_guess(hose: GedsHose, places: Array, arc_lengths: Array) -> Array:
     """The first shape, from the source to the tip; a free end goes straight on. (257, 3), m."""
     even = np.linspace(0.0, hose.spec.length, N_POINTS)

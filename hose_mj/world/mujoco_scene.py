@@ -33,13 +33,7 @@ HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 
 @dataclass(frozen=True)
 class Numerics:
-    """How MuJoCo steps a scene with a hose.
-
-    Attributes:
-        timestep: of the world (s).
-        substeps: MuJoCo's steps in one of these.
-        integrator, jacobian: MuJoCo's names.
-    """
+    """How MuJoCo steps a scene with a hose; `substeps` of its steps are one of the world's (s)."""
 
     timestep: float
     substeps: int
@@ -80,17 +74,10 @@ def join_hose(
 ) -> tuple[mujoco.MjModel, np.ndarray]:
     """Adds a hose to a scene, behind all that is there, and ties it to robots and source.
 
-    Args:
-        scene: checked.
-        maker: its spec.
-        hose: with sites hold0, hold1, ... for the robots and, last, the source.
-        ties: solref and solimp of the ties, equality constraints of these names.
-
-    Returns:
-        the model and the ids of the hose's bodies in their order.
-
-    Raises:
-        InputError: MuJoCo refuses the two together, or the scene changes the hose's mass.
+    The hose has sites hold0, hold1, ... for the robots and, last, the source; equality constraints
+    of these names, with the solref and solimp of `ties`, hold it. Returned are the model and the
+    ids of the hose's bodies in their order. `InputError` is raised if MuJoCo refuses the two
+    together, or the scene changes the hose's mass.
     """
     names = [body.name for body in hose.bodies if body.name != "world"]
     maker.attach(hose, prefix=PREFIX, frame=maker.worldbody.add_frame())
@@ -153,17 +140,9 @@ def open_scene(
 ) -> tuple[HoseContact, list[Obstacle]]:
     """Lets the geoms of a scene touch the pieces of a hose between nodes (N + 1,), m.
 
-    Args:
-        scene: checked.
-        maker: its spec, compiled; what its geoms collide with is changed.
-        nodes: arc lengths.
-        step: the world's time step (s).
-
-    Returns:
-        how the hose touches them, and where the simple ones stand at the start.
-
-    Raises:
-        InputError: a scene that leaves too few bits.
+    What the geoms of `maker`, the scene's compiled spec, collide with is changed; `step` is the
+    world's (s). Returned are how the hose touches them, and where the simple ones stand at the
+    start. `InputError` is raised for a scene that leaves too few bits.
     """
     model = maker.compile()
     data = mujoco.MjData(model)

@@ -18,20 +18,15 @@ from hose_mj.errors import StepError
 from hose_mj.hoses.inputs import check_arc_lengths, check_count
 from hose_mj.hoses.mujoco.chain import check_plain
 from hose_mj.hoses.mujoco.chain_holds import find_rows
-from hose_mj.hoses.mujoco.flex_layout import interpolate
-from hose_mj.hoses.mujoco.model import Motion, mute_warnings, went_bad
+from hose_mj.hoses.mujoco.chain_layout import ChainMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexMotion, interpolate
+from hose_mj.hoses.mujoco.model import mute_warnings, went_bad
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf.scene import Scene
+from hose_mj.world import mujoco_scene
 from hose_mj.world.centre_line import CentreLine
-from hose_mj.world.initial_shape import make_initial_shape
-from hose_mj.world.mujoco_scene import (
-    PREFIX,
-    HoseContact,
-    Numerics,
-    join_hose,
-    open_scene,
-)
+from hose_mj.world.initial_shape import N_POINTS, relax_initial_shape
 from hose_mj.world.world import World
 
 _ROUNDS = 50
@@ -65,28 +60,36 @@ class MujocoWorld(World):
         InputError: a value outside its valid set, a hose or a scene that MuJoCo cannot model.
     """
 
-    def __init__(self, scene: Scene, nodes: Array, numerics: Numerics) -> None:
+    _advice: str
+    """What to try where the hose is unstable."""
+    _tension_places: Array
+    """Arc lengths where tensions are known (m)."""
+
+    def __init__(self, scene: Scene, nodes: Array, numerics: mujoco_scene.Numerics) -> None:
         check_plain(type(self).__name__, scene.spec)
         self.nodes, self.substeps = nodes, numerics.substeps
         self._timestep = numerics.timestep
         maker = scene.make_spec()
         numerics.apply(maker.option)
-        contact, obstacles = open_scene(scene, maker, nodes, numerics.timestep)
+        contact, obstacles = mujoco_scene.open_scene(scene, maker, nodes, numerics.timestep)
         hose = self._make_hose(scene.spec, contact, numerics.tie_options())
-        model, self.hose_bodies = join_hose(scene, maker, hose, numerics.tie_options())
+        model, self.hose_bodies = mujoco_scene.join_hose(scene, maker, hose, numerics.tie_options())
         self._finish_model(scene.spec, model)
         super().__init__(scene, model)
         first = int(model.body_dofadr[self.hose_bodies[0]])
         self._joints = slice(first, first + int(model.body_dofnum[self.hose_bodies].sum()))
-        self._holds = [model.equality(f"{PREFIX}hold{k}").id for k in range(len(self.arc_lengths))]
-        self._motion: Motion | None = None
+        self._holds = [
+            model.equality(f"{mujoco_scene.PREFIX}hold{k}").id for k in range(len(self.arc_lengths))
+        ]
+        self._motion: ChainMotion | FlexMotion | None = None
         self._forces = np.zeros((len(self.arc_lengths), 3))
         self._tensions = np.zeros(0)
         self._start_bodies()
         places = self.site_positions()
-        curve = make_initial_shape(
+        relaxed = relax_initial_shape(
             scene.spec, places, self.arc_lengths, obstacles, np.array(self.model.opt.gravity)
         )
+        curve = relaxed.position(np.linspace(0.0, scene.spec.length, N_POINTS))
         self._start = fit_curve(curve, nodes, self.arc_lengths, places)
         self.reset()
         met = self.hose_position(self.arc_lengths) - self.site_positions()
@@ -96,14 +99,12 @@ class MujocoWorld(World):
 
     @abstractmethod
     def _make_hose(
-        self, spec: HoseSpec, contact: HoseContact, ties: dict[str, list[float]]
+        self, spec: HoseSpec, contact: mujoco_scene.HoseContact, ties: dict[str, list[float]]
     ) -> mujoco.MjSpec:
         """A model of the hose alone, with sites hold0, hold1, ... for robots and source.
 
-        Args:
-            spec: the hose.
-            contact: how it touches the scene.
-            ties: solref and solimp of equality constraints.
+        `contact` says how it touches the scene; `ties` are solref and solimp of equality
+        constraints.
         """
 
     def _finish_model(self, spec: HoseSpec, model: mujoco.MjModel) -> None:
@@ -114,22 +115,12 @@ class MujocoWorld(World):
         """Writes the qpos of the hose with its nodes at (K + 1, 3), m."""
 
     @abstractmethod
-    def _read_motion(self) -> Motion:
+    def _read_motion(self) -> ChainMotion | FlexMotion:
         """Reads how the hose lies and moves now."""
 
     @abstractmethod
     def _read_tensions(self) -> Array:
         """Tensions in MuJoCo's last step, where `_tension_places` says."""
-
-    @property
-    @abstractmethod
-    def _tension_places(self) -> Array:
-        """Arc lengths where tensions are known (m)."""
-
-    @property
-    @abstractmethod
-    def _advice(self) -> str:
-        """What to try where the hose is unstable."""
 
     # -- the world's protocol ----------------------------------------------------------------------
 
@@ -223,7 +214,7 @@ class MujocoWorld(World):
         self._motion = None
         self._update_poses()
 
-    def _move(self) -> Motion:
+    def _move(self) -> ChainMotion | FlexMotion:
         if self._motion is None:
             self._motion = self._read_motion()
         return self._motion
@@ -239,13 +230,7 @@ class MujocoWorld(World):
 
 @dataclass(frozen=True)
 class Pin:
-    """A point of a chain that is to be at a target.
-
-    Attributes:
-        piece: number of the straight piece.
-        part: fraction of the piece that lies before the point.
-        target: (3,), m.
-    """
+    """A point of a chain, at a part of one of its straight pieces, that is to be at (3,), m."""
 
     piece: int
     part: float
@@ -253,16 +238,10 @@ class Pin:
 
 
 def fit_curve(curve: Array, nodes: Array, arc_lengths: Array, places: Array) -> Array:
-    """Returns a chain along a curve.
+    """Returns a chain, nodes (K + 1, 3), m, along a curve; see `fit_chain`.
 
-    Args:
-        curve: points even in arc length from 0 to L (n, 3), m.
-        nodes: arc lengths of the chain's nodes, rising from 0 to L, (K + 1,), m.
-        arc_lengths: of what holds it (k,), m.
-        places: where that is (k, 3), m.
-
-    Returns:
-        nodes (K + 1, 3), m, near the curve; see `fit_chain`.
+    The curve's points (n, 3), m, are even in arc length from 0 to L, the chain's nodes at arc
+    lengths (K + 1,), m. It is held at `arc_lengths` (k,), m, in `places` (k, 3), m.
     """
     even, lengths = np.linspace(0.0, nodes[-1], len(curve)), np.diff(nodes)
     points = np.stack([np.interp(nodes, even, curve[:, c]) for c in range(3)], axis=1)
@@ -273,18 +252,10 @@ def fit_curve(curve: Array, nodes: Array, arc_lengths: Array, places: Array) -> 
 
 
 def fit_chain(points: Array, lengths: Array, pins: list[Pin]) -> Array:
-    """Returns nodes near `points` whose distances are `lengths` and that meet the pins.
+    """Returns nodes (N + 1, 3), m, near `points` at distances `lengths` (N,) that meet the pins.
 
     Newton's method on these equations, each step the smallest that solves their linear form. What
     cannot be met (pins further apart than the chain is long) is left as it is after so many rounds.
-
-    Args:
-        points: (N + 1, 3), m.
-        lengths: (N,), m.
-        pins: what holds the chain.
-
-    Returns:
-        nodes (N + 1, 3), m.
     """
     nodes = points.copy()
     count = len(lengths)

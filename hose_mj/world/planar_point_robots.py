@@ -25,12 +25,7 @@ _ALIGNED = 1.0 - 1e-12
 class PlanarPointRobots:
     """The robots of a world in which nothing else moves, each a body on slides along world axes.
 
-    Args:
-        world: as it starts.
-        hose: of the world.
-        contact: of the hose with the scene.
-        axes: axis of the world that each degree of freedom goes along, (nv,).
-        signs: +1 or -1, whether it goes up or down that axis, (nv,).
+    Each degree of freedom goes along one of the `axes` (nv,), up or down by the `signs` (nv,).
     """
 
     def __init__(
@@ -47,7 +42,11 @@ class PlanarPointRobots:
         full = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
         mass[self._at], drag[self._at] = np.diag(full), model.dof_damping
-        self._constant = self._find_constant_force()
+        # What acts at rest, (nv,): weight, and what MuJoCo takes off it.
+        rest = mujoco.MjData(model)
+        rest.qpos[:] = data.qpos
+        mujoco.mj_forward(model, rest)
+        self._constant = np.array(rest.qfrc_smooth)
         flat = bool(np.isinf(mass[:, 2]).all())
         reach, radius = np.zeros((2, k))
         for i, site in enumerate(self._sites):
@@ -153,14 +152,6 @@ class PlanarPointRobots:
             first = np.unique(owner, return_index=True)
             contact.pushes[first[1], :3] = masses.push[first[0]]
         return done
-
-    def _find_constant_force(self) -> Array:
-        """Generalised forces (nv,) that act at rest: weight, and what MuJoCo takes off it."""
-        world = self._world
-        data = mujoco.MjData(world.model)
-        data.qpos[:] = world.data.qpos
-        mujoco.mj_forward(world.model, data)
-        return np.array(data.qfrc_smooth)
 
     def _find_motor_forces(self) -> Array:
         """Generalised forces (nv,) of the motors under the world's controls."""

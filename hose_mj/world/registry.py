@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from hose_mj.errors import InputError
+from hose_mj.errors import check_choice
 from hose_mj.hoses.registry import check_model
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.world import World
@@ -30,8 +30,7 @@ def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -
     Raises:
         InputError: an unknown scene, model or option, or what reading the scene finds wrong.
     """
-    if model not in WORLDS:
-        raise InputError("model", model, "one of " + ", ".join(WORLDS))
+    check_choice("model", model, WORLDS)
     check_model(model)
     module, _, name = WORLDS[model].partition(":")
     world_class: type[World] = getattr(import_module(module), name)

@@ -64,14 +64,10 @@ class SceneGeoms:
     def make_obstacles(
         self, model: mujoco.MjModel, data: mujoco.MjData, friction: float, stiffness: float = 0.0
     ) -> list[Obstacle]:
-        """Returns the obstacles at the poses in `data`, at rest.
+        """Returns the obstacles at the poses in `data`, at rest, with Coulomb's friction.
 
-        Args:
-            model: MuJoCo's.
-            data: MuJoCo's.
-            friction: Coulomb's coefficient.
-            stiffness: force per length and depth that a body is to feel with a delay of one step,
-                N/m^2; where it is too light for that, its contact is softer. 0 for no such thing.
+        `stiffness` is the force per length and depth that a body is to feel with a delay of one
+        step, N/m^2; where it is too light for that, its contact is softer. 0 for no such thing.
         """
         masses = np.zeros(model.nbody)
         np.add.at(masses, model.body_weldid, model.body_mass)

@@ -167,11 +167,8 @@ def is_constant(world: World, motors: Motors) -> bool:
 class SlideServo:
     """All robots whose joints slide, at once: their gains never change.
 
-    Args:
-        world: with the robots.
-        robots: the motors of each, in the sites' chains.
-        bandwidth: w (1/s).
-        speed: v_max (m/s).
+    `robots` are the motors of each in the sites' chains, `bandwidth` is w (1/s), `speed` v_max
+    (m/s).
     """
 
     def __init__(
@@ -215,11 +212,7 @@ class SlideServo:
 class ArmServo:
     """One robot whose site turns about joints: its gains follow its pose.
 
-    Args:
-        world: with the robot.
-        motors: those in the site's chain.
-        bandwidth: w (1/s).
-        speed: v_max (m/s).
+    `motors` are those in the site's chain, `bandwidth` is w (1/s), `speed` v_max (m/s).
     """
 
     def __init__(self, world: World, motors: Motors, bandwidth: float, speed: float) -> None:
@@ -298,25 +291,14 @@ _PARALLEL = 1e-3
 _SHARE_OF_GRIP = 0.25
 """Acceleration that braking counts on, as a share of gravity's."""
 _ROUND = {
-    int(kind)
-    for kind in (
-        mujoco.mjtGeom.mjGEOM_SPHERE,
-        mujoco.mjtGeom.mjGEOM_CAPSULE,
-        mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        mujoco.mjtGeom.mjGEOM_CYLINDER,
-        mujoco.mjtGeom.mjGEOM_MESH,
-    )
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
+    for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "MESH")
 }
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 
 
 class WheelServo:
-    """One base with two driven wheels; `WheelServo.fits` tells whether a robot is one.
-
-    Args:
-        world: with the robot.
-        motors: the two that turn the wheels.
-        speed: highest speed (m/s).
-    """
+    """One base with two driven wheels, where `fits`; `speed` is the highest (m/s)."""
 
     def __init__(self, world: World, motors: Motors, speed: float) -> None:
         model = world.model
@@ -409,6 +391,3 @@ def _compute_wheel_radius(model: mujoco.MjModel, body: int) -> float:
         and (model.geom_contype[g] or model.geom_conaffinity[g])
     ]
     return max(radii, default=0.0)
-
-
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)

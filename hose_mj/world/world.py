@@ -152,8 +152,7 @@ class World(ABC):
     def apply_force(self, robot: int, force: ArrayLike) -> None:
         """Sets a force (3,), N, on a robot at its site; it acts until it is set anew.
 
-        Raises:
-            InputError: a number that no robot has, a force that is not three finite numbers.
+        `InputError` is raised for a robot that there is not, or what is not three finite numbers.
         """
         if check_count("robot", robot, 0) >= self.n_robots:
             raise InputError("robot", robot, f"0 (tip) to {self.n_robots - 1}")
@@ -178,11 +177,7 @@ class World(ABC):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot of this world.
-
-        Raises:
-            InputError: a snapshot of another world.
-        """
+        """Returns to a snapshot of this world; `InputError` for one of another."""
         size = mujoco.mj_stateSize(self.model, _STATE)
         if state["mujoco"].shape != (size,):
             raise InputError("size of the state", state["mujoco"].shape, "a snapshot of this world")

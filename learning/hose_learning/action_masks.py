@@ -72,11 +72,7 @@ class SharedPolicyEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Starts an episode.
-
-        Raises:
-            InputError: options, of which there are none.
-        """
+        """Starts an episode; `InputError` for options, of which there are none."""
         super().reset(seed=seed)
         refuse_reset_options(options)
         self.episode.reset(self.np_random)
@@ -113,15 +109,9 @@ class VetoMasks:
     """What a veto learner forbids, as masks; it can go on learning.
 
     Vetoes are those of boolean modules (section 5.3) and of values below their thresholds (section
-    4.5). Only the former can be learned here. Several environments may share one of these: what one
-    of them runs into, all of them avoid.
-
-    Args:
-        training: whose vetoes they are, trained or not. They are copied: the training stays as it
-            is.
-
-    Attributes:
-        task: the task that it was trained on.
+    4.5), of a training that may be trained or not. They are copied: the training stays as it is.
+    Only the former can be learned here. Several environments may share one of these: what one of
+    them runs into, all of them avoid.
     """
 
     def __init__(self, training: Training) -> None:
@@ -140,16 +130,11 @@ class VetoMasks:
         return int(np.bitwise_count(self._memory.vetoes.rows).sum())
 
     def compute_mask(self, state: Integers, agent: int, available: Mask | None = None) -> Mask:
-        """Computes what an agent may do (n_actions,), never nothing at all.
+        """Computes what an agent may do in a state (n_actions,), never nothing at all.
 
         Where everything is vetoed it is the learner's fallback ("none") if there is one, and else
-        whatever is available.
-
-        Args:
-            state: of the task.
-            agent: its number.
-            available: what may be done at all (n_actions,), at least one action; None for what the
-                task says.
+        whatever is available. `available` (n_actions,) is what may be done at all, at least one
+        action; None for what the task says.
         """
         self._memory.state[:] = state
         bits = int(self._call(compute_unvetoed, agent))
@@ -165,14 +150,8 @@ class VetoMasks:
     def learn(self, state: Integers, agent: int, action: int, events: int) -> None:
         """Vetoes what an agent did in a state, if its events break what a boolean module guards.
 
-        Only the agent that caused the events is to be charged with them: vetoes for others would
-        forbid innocent actions.
-
-        Args:
-            state: of the task, before the action.
-            agent: its number.
-            action: what it did.
-            events: what it caused, as bits.
+        Only the agent that caused the events (bits) is to be charged with them: vetoes for others
+        would forbid innocent actions.
         """
         if count_free(self._memory.vetoes) <= len(self._learner.veto_bases):
             self._memory = self._memory._replace(vetoes=grow(self._memory.vetoes))

@@ -37,14 +37,9 @@ def compose(task: Any, learner: Learner, memory: Memory, start: Integers) -> Non
 
     Agent i chooses greedily in the state that its predecessors expect to hand on. In a
     deterministic task an estimated transition is what was seen, so here it is played on a copy of
-    the state, as if everything had been seen once; `hose_learning.mdp.joint_policy` has the
-    estimates. Where a terminal state is expected nobody moves any more.
-
-    Args:
-        task: the task's kernel record.
-        learner: the learner.
-        memory: a probe; its state stays as it is.
-        start: work array of the state's length.
+    the state (`start`, a work array), as if everything had been seen once;
+    `hose_learning.mdp.joint_policy` has the estimates. Where a terminal state is expected nobody
+    moves any more. The memory is a probe, whose state stays as it is.
     """
     state = memory.state
     for k in range(state.shape[0]):
@@ -123,16 +118,10 @@ def run_tests(
     max_moves: int,
     results: Integers,
 ) -> None:
-    """Plays greedy episodes.
+    """Plays greedy episodes, the agents moving in a manner (`Turns`, `Joint` or `Composed`).
 
-    Args:
-        manner: how the agents move, `Turns`, `Joint` or `Composed`.
-        task: the task's kernel record.
-        learner: the learner.
-        memory: a probe (`make_probe`), changed in place.
-        n_episodes: how many.
-        max_moves: moves of single agents after which an episode is given up.
-        results: moves of single agents and last events of each (n_episodes, 2), written in place.
+    The memory is a probe (`make_probe`), changed in place. An episode is given up after `max_moves`
+    of single agents. `results` gets moves of single agents and last events of each (n_episodes, 2).
     """
     for episode in range(n_episodes):
         begin_episode(task, memory)

@@ -30,23 +30,11 @@ _NAMES = ("variables", "agent_names", "action_names", "event_names", "reward_nam
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Experience:
-    """A log of n moves. The arrays are those of `hose_learning.loop.Rows`.
+    """A log of n moves of a task, by its id; the arrays are those of `hose_learning.loop.Rows`.
 
-    Attributes:
-        task: id of the task.
-        variables: names of the columns of `values`, n_variables of them.
-        cardinalities: number of values of each variable (n_variables,).
-        agent_names: by number.
-        action_names: by number.
-        event_names: event k is bit k of `events`.
-        reward_names: names of the columns of `rewards`.
-        violations: the events that break a constraint, as bits.
-        values: what the mover saw before its move (n, n_variables).
-        agents: who moved (n,).
-        actions: its action (n,).
-        events: what the move caused (n,).
-        rewards: what the mover got for it (n, n_signals).
-        next_values: what the mover saw right after its move (n, n_variables).
+    `variables` names the columns of `values`, each with a number of values (n_variables,), and
+    `reward_names` those of `rewards`; agents and actions are named by number, event k is bit k.
+    `violations` are the events that break a constraint, as bits.
     """
 
     task: str
@@ -82,15 +70,9 @@ class Experience:
 def record_experience(task: Task, n_moves: int, generator: np.random.Generator) -> Experience:
     """Plays random available actions (epsilon = 1), agents in turn, and logs every move.
 
-    An episode that ends, or reaches the task's step limit, is followed by another one.
-
-    Args:
-        task: compiled or in plain Python.
-        n_moves: moves of single agents.
-        generator: of the actions and the initial states.
-
-    Raises:
-        InputError: fewer than one move.
+    An episode that ends, or reaches the task's step limit, is followed by another one. The task may
+    be compiled or in plain Python; `n_moves` are moves of single agents, and `InputError` is raised
+    for fewer than one. The generator seeds actions and initial states.
     """
     if n_moves < 1:
         raise InputError("n_moves", n_moves, "a whole number, at least 1")
@@ -138,11 +120,7 @@ def write_experience(path: Path, experience: Experience) -> None:
 
 
 def read_experience(path: Path) -> Experience:
-    """Reads a log.
-
-    Raises:
-        InputError: no such file, or one that `write_experience` did not write.
-    """
+    """Reads a log; `InputError` for what `write_experience` did not write."""
     valid = "a file written by write_experience"
     try:
         with np.load(path, allow_pickle=False) as archive:

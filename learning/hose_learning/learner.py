@@ -7,24 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
+from hose_learning import records
 from hose_learning.mediators import MEDIATORS
 from hose_learning.modules import make_arrays, make_masks, make_module_rewards
-from hose_learning.records import (
-    EPSILON,
-    FRESH,
-    N_COUNTERS,
-    N_NUMBERS,
-    TEMPERATURE,
-    Learner,
-    Memory,
-)
+from hose_learning.records import Memory
 from hose_learning.settings import POLICIES, Exploration, LearnerSettings
 from hose_learning.tables import Table, make_table
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-Made = tuple[Learner, Memory]
+Made = tuple[records.Learner, Memory]
 """What the factory of a learner returns."""
 
 
@@ -37,19 +30,12 @@ def make_learner(
     width: int | None = None,
     n_parts: int | None = None,
 ) -> Made:
-    """Makes a learner that has learned nothing, and its memory.
+    """Makes a learner that has learned nothing, and its memory; the generator seeds its chance.
 
-    Args:
-        task: the task it is for.
-        settings: its settings.
-        rule: record of its update rule.
-        generator: seeds the choices and the resets.
-        own: what the rule keeps beside the tables, a NamedTuple of arrays.
-        width: length of a row of Q-values; by default the number of actions.
-        n_parts: tables of each value module; by default one for each agent.
-
-    Raises:
-        InputError: a module names what the task does not have, or sees too much.
+    `rule` is the record of its update rule and `own` what that keeps beside the tables, a
+    NamedTuple of arrays. A row of Q-values is `width` long, by default the number of actions; each
+    value module has `n_parts` tables, by default one for each agent. `InputError` is raised for a
+    module that names what the task does not have, or sees too much.
     """
     values = settings.select("value")
     vetoes = settings.select("veto")
@@ -57,7 +43,8 @@ def make_learner(
     vetoed = make_arrays(task, vetoes, task.n_agents)
     thresholds = np.array([-np.inf if m.threshold is None else m.threshold for m in values])
     exploration = settings.exploration
-    learner = Learner(
+    has_none = settings.fallback == "none" and "none" in task.action_names
+    learner = records.Learner(
         rule=rule,
         columns=seen.columns,
         strides=seen.strides,
@@ -76,7 +63,7 @@ def make_learner(
         return_of_event=task.kernel.reward_table.sum(axis=1),
         mediator=MEDIATORS[settings.mediator],
         policy=POLICIES.index(exploration.policy),
-        fallback=_find_fallback(task, settings),
+        fallback=task.action_names.index("none") if has_none else -1,
         learning_rate=float(settings.learning_rate),
         learning_rate_decay=float(settings.learning_rate_decay),
         per_episode=float(exploration.per_episode),
@@ -90,12 +77,6 @@ def make_learner(
     return learner, memory._replace(stream=make_stream(generator), starts=make_stream(generator))
 
 
-def _find_fallback(task: Task, settings: LearnerSettings) -> int:
-    """Returns the number of the action that is left where all are vetoed, -1 for any."""
-    has_none = settings.fallback == "none" and "none" in task.action_names
-    return task.action_names.index("none") if has_none else -1
-
-
 def _make_memory(
     task: Task,
     exploration: Exploration,
@@ -106,11 +87,11 @@ def _make_memory(
 ) -> Memory:
     """Makes a memory in which nobody has moved yet, for so many value and veto modules."""
     n_agents, (n_values, n_vetoes) = task.n_agents, counts
-    numbers = np.zeros(N_NUMBERS)
-    numbers[EPSILON] = exploration.epsilon
-    numbers[TEMPERATURE] = exploration.epsilon * exploration.temperature_factor
-    counters = np.zeros(N_COUNTERS, np.int64)
-    counters[FRESH] = 1
+    numbers = np.zeros(records.N_NUMBERS)
+    numbers[records.EPSILON] = exploration.epsilon
+    numbers[records.TEMPERATURE] = exploration.epsilon * exploration.temperature_factor
+    counters = np.zeros(records.N_COUNTERS, np.int64)
+    counters[records.FRESH] = 1
 
     def integers(*shape: int) -> Integers:
         return np.zeros(shape, np.int64)

@@ -11,21 +11,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hose_learning import rules
+from hose_learning import records, rules
 from hose_learning.mediators import compute_above_thresholds
 from hose_learning.policies import GREEDY, compute_best, draw_allowed, draw_soft_max
-from hose_learning.records import (
-    EPISODES,
-    EPSILON,
-    FRESH,
-    MOVES,
-    RETURN,
-    SUCCESSES,
-    TEMPERATURE,
-    Learner,
-    Log,
-    Memory,
-)
+from hose_learning.records import EPISODES, EPSILON, FRESH, RETURN, Learner, Log, Memory
 from hose_learning.tables import claim, count_free, find
 from hose_mj.jit import bitwise, compiled, jitable
 from hose_mj.tasks import kernels
@@ -89,8 +78,8 @@ def choose(
     if explores and learner.policy == GREEDY and draw_unit(memory.stream) < memory.numbers[EPSILON]:
         return draw_allowed(allowed, memory.stream)
     rules.score(learner.rule, learner, memory, agent)
-    if explores and learner.policy != GREEDY and memory.numbers[TEMPERATURE] > 0.0:
-        temperature = memory.numbers[TEMPERATURE]
+    if explores and learner.policy != GREEDY and memory.numbers[records.TEMPERATURE] > 0.0:
+        temperature = memory.numbers[records.TEMPERATURE]
         return draw_soft_max(memory.scores, allowed, temperature, memory.stream)
     return draw_allowed(compute_best(memory.scores, allowed), memory.stream)
 
@@ -124,10 +113,10 @@ def log_episode(task: Any, learner: Learner, memory: Memory, log: Log, events: i
     log.returns[row] = memory.numbers[RETURN]
     log.used[0] = row + 1
     memory.counters[EPISODES] += 1
-    memory.counters[SUCCESSES] += success
+    memory.counters[records.SUCCESSES] += success
     fall = learner.per_episode + learner.per_success * success
     memory.numbers[EPSILON] = max(learner.least_epsilon, memory.numbers[EPSILON] - fall)
-    memory.numbers[TEMPERATURE] = learner.temperature_factor * memory.numbers[EPSILON]
+    memory.numbers[records.TEMPERATURE] = learner.temperature_factor * memory.numbers[EPSILON]
     memory.counters[FRESH] = 1
 
 
@@ -143,18 +132,10 @@ def count_events(task: Any, learner: Learner, memory: Memory, events: int) -> No
 def run_turns(
     task: Any, learner: Learner, memory: Memory, log: Log, max_moves: int, max_episodes: int
 ) -> int:
-    """Trains agents that move one after the other.
+    """Trains agents that move one after the other; returns the number of moves.
 
-    Args:
-        task: the task's kernel record.
-        learner: the learner.
-        memory: its memory, changed in place.
-        log: filled in place, one row for each episode that ends.
-        max_moves: most moves of single agents.
-        max_episodes: most episodes to end.
-
-    Returns:
-        The number of moves.
+    The memory is changed in place, and the log gets a row for each episode that ends. It ends after
+    that many moves of single agents or episodes, or where there is no more room.
     """
     last_episode = memory.counters[EPISODES] + max_episodes
     moves = 0
@@ -169,7 +150,7 @@ def run_turns(
         action = choose(task, learner, memory, agent, allowed, True)
         events = kernels.apply(task, memory.state, agent, action)
         moves += 1
-        memory.counters[MOVES] += 1
+        memory.counters[records.MOVES] += 1
         memory.actions[agent] = action
         memory.steps_since_action[agent] = 0
         keep_keys(learner, memory, agent)
@@ -229,7 +210,7 @@ def run_joint(
             keep_keys(learner, memory, agent)
         events = kernels.apply_joint(task, memory.state, memory.actions, memory.caused_events)
         moves += n_agents
-        memory.counters[MOVES] += n_agents
+        memory.counters[records.MOVES] += n_agents
         accumulate_joint(learner, memory)
         for agent in range(n_agents):
             if memory.caused_events[agent]:
@@ -268,13 +249,10 @@ class Rows(NamedTuple):
 
 @compiled
 def fill_rows(record: Any, state: Integers, stream: Stream, rows: Rows) -> None:
-    """Plays random available actions, agents in turn, until all rows are written.
+    """Plays random available actions, agents in turn, until all rows are written in place.
 
-    Args:
-        record: the task's kernel record.
-        state: an initial state, advanced in place through as many episodes as it takes.
-        stream: random numbers for the actions and the resets.
-        rows: written in place.
+    The state, an initial one, is advanced through as many episodes as it takes; the stream decides
+    actions and resets.
     """
     for k in range(rows.agents.shape[0]):
         agent = state[TURN]

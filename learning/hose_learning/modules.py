@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.task import Task
 from hose_mj.tasks.variables import LARGEST_SIZE
@@ -52,20 +52,16 @@ class Module:
 
     def __post_init__(self) -> None:
         for name, choices in (("kind", get_args(Kind)), ("credit", get_args(Credit))):
-            if getattr(self, name) not in choices:
-                valid = "one of " + ", ".join(choices)
-                raise InputError(f"{name} of module {self.name}", getattr(self, name), valid)
+            check_choice(f"{name} of module {self.name}", getattr(self, name), choices)
 
 
 @dataclass(frozen=True)
 class Arrays:
     """What loops need of modules of one kind.
 
-    Attributes:
-        columns: places of the variables among all (n_modules, width).
-        strides: what a step of each adds to the key; 0 pads (n_modules, width).
-        bases: first key of each agent (n_modules, n_agents).
-        size: number of keys.
+    A variable has a place among all and adds a stride to the key for each step, 0 where it pads
+    (n_modules, width); `bases` are the first key of each agent (n_modules, n_agents), `size` is the
+    number of keys.
     """
 
     columns: Integers
@@ -77,13 +73,8 @@ class Arrays:
 def make_arrays(task: Task, modules: Sequence[Module], n_parts: int) -> Arrays:
     """Lays the states that the modules of one kind see one after the other.
 
-    Args:
-        task: the task.
-        modules: the modules.
-        n_parts: how many parts each has: one for each agent, or one for a team.
-
-    Raises:
-        InputError: an unknown variable, or more than 2^62 keys in all.
+    Each has `n_parts`: one for each agent, or one for a team. `InputError` is raised for an unknown
+    variable, or more than 2^62 keys in all.
     """
     projections = [task.make_projection(module.variables) for module in modules]
     width = max([1, *(len(p.columns) for p in projections)])
@@ -118,8 +109,7 @@ def make_module_rewards(task: Task, modules: Sequence[Module]) -> Floats:
     rewards = np.zeros((len(table), 2, len(modules)))
     for place, module in enumerate(modules):
         for signal in module.signals:
-            if signal not in task.rewards:
-                raise InputError("signal", signal, "one of " + ", ".join(task.rewards))
+            check_choice("signal", signal, task.rewards)
             column = task.rewards.index(signal)
             rewards[:, 1, place] += table[:, column]
             if module.credit == "cycle":
@@ -130,18 +120,11 @@ def make_module_rewards(task: Task, modules: Sequence[Module]) -> Floats:
 def make_masks(thing: str, names: Sequence[str], chosen: Sequence[Sequence[str]]) -> Integers:
     """Returns some names of each module as bits of one integer (n_modules,).
 
-    Args:
-        thing: what is named, for the message: an "event" that a veto module answers to, or an
-            "action" that it is about.
-        names: all of them; bit k stands for the k-th.
-        chosen: those of each module.
-
-    Raises:
-        InputError: an unknown name.
+    Bit k stands for the k-th of all `names`. `thing` is what they name, for the `InputError` that
+    an unknown one raises.
     """
     masks = np.zeros(len(chosen), np.int64)
     for place, name in ((place, name) for place, own in enumerate(chosen) for name in own):
-        if name not in names:
-            raise InputError(thing, name, "one of " + ", ".join(names))
+        check_choice(thing, name, names)
         masks[place] |= 1 << names.index(name)
     return masks

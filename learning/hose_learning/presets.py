@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hose_learning.modules import Module
-from hose_mj.errors import InputError
+from hose_mj.errors import check_choice
 from hose_mj.tasks.task import Task
 
 VALUES = ("goal", "local", "monolithic")
@@ -24,12 +24,7 @@ VETO_THRESHOLD = -10.0
 class Constraint:
     """What one way to break a constraint has to do with.
 
-    Attributes:
-        name: for messages and listings.
-        variables: the variables that tell it.
-        events: its events.
-        signals: its reward signals.
-        actions: the actions concerned; none for all.
+    Variables tell it; `actions` are those concerned, none for all.
     """
 
     name: str
@@ -41,14 +36,10 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Parts:
-    """What a task consists of for a modular learner.
+    """What a task consists of for a modular learner, each part as names of variables.
 
-    Attributes:
-        state: variables that together are the whole state, as far as it matters.
-        goal: variables that the goal module sees.
-        local: those that it sees of what is near the agent.
-        signals: reward signals of the goal.
-        constraints: those of the task.
+    `state` are those that together are the whole state, as far as it matters; the goal module sees
+    `goal`, or `local`, what is near the agent, and learns from `signals`.
     """
 
     state: tuple[str, ...]
@@ -66,21 +57,13 @@ def find_parts(task: Task) -> Parts:
 def make_modules(
     task: Task, values: str, vetoes: str, threshold: float = VETO_THRESHOLD
 ) -> tuple[Module, ...]:
-    """Makes modules for a task.
+    """Makes modules for a task, by names of `VALUES` and `VETOES`.
 
-    Args:
-        task: the task.
-        values: one of `VALUES`.
-        vetoes: one of `VETOES`.
-        threshold: of the modules of "thresholds".
-
-    Raises:
-        InputError: an unknown choice.
+    The threshold is that of the modules of "thresholds". `InputError` is raised for an unknown
+    choice.
     """
-    if values not in VALUES:
-        raise InputError("values", values, "one of " + ", ".join(VALUES))
-    if vetoes not in VETOES:
-        raise InputError("vetoes", vetoes, "one of " + ", ".join(VETOES))
+    check_choice("values", values, VALUES)
+    check_choice("vetoes", vetoes, VETOES)
     parts = find_parts(task)
     if values == "monolithic":
         goal = Module(name="monolithic", variables=parts.state, signals=task.rewards)

@@ -120,12 +120,9 @@ class Memory(NamedTuple):
 
 
 class Log(NamedTuple):
-    """One row for each episode, filled from the front.
+    """One row for each episode, filled from the front; `used` is the number of rows written (1,).
 
-    Attributes:
-        used: number of rows written (1,).
-        episodes: moves and last events (capacity, N_LOGGED).
-        returns: sum of all rewards (capacity,).
+    They are moves and last events (capacity, N_LOGGED), and sums of all rewards (capacity,).
     """
 
     used: Integers

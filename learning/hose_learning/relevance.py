@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from hose_learning.experience import Bools, Experience
 from hose_learning.modules import Module
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.task import Task
 
@@ -24,13 +24,7 @@ _LARGEST_NUMBER = 2**62
 
 @dataclass(frozen=True)
 class Signal:
-    """What one veto module would answer to.
-
-    Attributes:
-        name: for listings.
-        event: the task's event.
-        actions: the actions concerned; none for all.
-    """
+    """What one veto module would answer to: an event and the actions concerned, none for all."""
 
     name: str
     event: str
@@ -39,13 +33,10 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Relevance:
-    """What Algorithm 5.1 found.
+    """What Algorithm 5.1 found of some variables and signals, in their order.
 
-    Attributes:
-        variables: the variables tested, as they were given.
-        signals: the signals.
-        relevant: whether a variable matters for a signal (n_variables, n_signals).
-        n_seen: logged moves with the signal's event (n_signals,).
+    `relevant` says whether a variable matters for a signal (n_variables, n_signals); `n_seen`
+    counts logged moves with the signal's event (n_signals,).
     """
 
     variables: tuple[str, ...]
@@ -95,16 +86,11 @@ def sort_by_range(values: Integers) -> list[int]:
 
 
 def find_relevant(values: Integers, moves: Integers, signal: Bools) -> Bools:
-    """Runs Algorithm 5.1 for one signal.
+    """Runs Algorithm 5.1 for one signal; returns whether each variable matters (n_variables,).
 
-    Args:
-        values: of the variables, before each move (n, n_variables).
-        moves: what two rows must have in common to be compared: the action, and who acted where
-            agents are told apart (n,).
-        signal: whether the move caused it (n,).
-
-    Returns:
-        Whether each variable matters (n_variables,).
+    `values` are those before each move (n, n_variables), `moves` what two rows must have in common
+    to be compared: the action, and who acted where agents are told apart (n,). `signal` says
+    whether the move caused it (n,).
     """
     kept = sort_by_range(values)
     for variable in list(kept):
@@ -238,6 +224,5 @@ def make_veto_modules(relevance: Relevance) -> tuple[Module, ...]:
 
 def _find(thing: str, name: str, names: tuple[str, ...]) -> int:
     """Returns a name's place among all."""
-    if name not in names:
-        raise InputError(thing, name, "one of " + ", ".join(names))
+    check_choice(thing, name, names)
     return names.index(name)

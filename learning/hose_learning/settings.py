@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from hose_learning.mediators import MEDIATORS
 from hose_learning.modules import Kind, Module
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 
 POLICIES = ("epsilon-greedy", "soft-max")
 FALLBACKS = ("none", "any")
@@ -43,8 +43,7 @@ class Exploration:
         check_range("per_episode", self.per_episode, 0.0, 1.0)
         check_range("per_success", self.per_success, 0.0, 1.0)
         check_range("temperature_factor", self.temperature_factor, 0.0, 1e9)
-        if self.policy not in POLICIES:
-            raise InputError("policy", self.policy, "one of " + ", ".join(POLICIES))
+        check_choice("policy", self.policy, POLICIES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +83,8 @@ class LearnerSettings:
         check_range("discount", self.discount, 0.0, 1.0)
         check_range("learning_rate", self.learning_rate, 0.0, 1.0)
         check_range("learning_rate_decay", self.learning_rate_decay, 0.0, 1e9)
-        if self.mediator not in MEDIATORS:
-            raise InputError("mediator", self.mediator, "one of " + ", ".join(MEDIATORS))
-        if self.fallback not in FALLBACKS:
-            raise InputError("fallback", self.fallback, "one of " + ", ".join(FALLBACKS))
+        check_choice("mediator", self.mediator, MEDIATORS)
+        check_choice("fallback", self.fallback, FALLBACKS)
         if not self.select("value"):
             names = [module.name for module in self.modules]
             raise InputError("modules", names, "at least one value module")

@@ -41,13 +41,9 @@ class Table(NamedTuple):
 
 
 def make_table(size: int, width: int, dtype: npt.DTypeLike, hashed: bool | None = None) -> Table:
-    """Makes a table of zeros.
+    """Makes a table of zeros for the keys 0 .. size - 1, with rows of a width and a type.
 
-    Args:
-        size: the keys are 0 .. size - 1.
-        width: length of a row.
-        dtype: type of the entries.
-        hashed: whether to hash; by default where `LARGEST_DENSE` is exceeded.
+    It is hashed, by default, where `LARGEST_DENSE` is exceeded.
     """
     if hashed is None:
         hashed = size * max(width, DENSE_WIDTH) > LARGEST_DENSE * DENSE_WIDTH
@@ -131,14 +127,7 @@ def _copy(table: Table, grown: Table) -> None:
 
 @compiled
 def write_rows(table: Table, keys: Integers, rows: Any, origins: Integers) -> None:
-    """Writes a row under each key.
-
-    Args:
-        table: the table, with room for all keys.
-        keys: where to write (n,).
-        rows: what to write from (n_rows, width).
-        origins: which row belongs under each key (n,).
-    """
+    """Writes under each key (n,) the row of `rows` that `origins` (n,) names; there is room."""
     for k in range(keys.shape[0]):
         row = claim(table, keys[k])
         for column in range(rows.shape[1]):

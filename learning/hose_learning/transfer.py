@@ -102,11 +102,8 @@ def make_image(source: Task, source_module: Module, target: Task, target_module:
 class Match:
     """A module that source and target have in common.
 
-    Attributes:
-        name: its name.
-        table: the field of the memory that holds its rows.
-        image: how its keys relate.
-        parts: first key of each agent in the source and in the target.
+    `table` is the field of the memory that holds its rows, `image` how its keys relate, `parts` the
+    first key of each agent in the source and in the target.
     """
 
     name: str
@@ -189,11 +186,8 @@ def match_modules(source: Training, target: Training) -> list[Match]:
 def carry(source: Table, target: Table, image: Image, parts: Iterable[tuple[int, int]]) -> Table:
     """Copies the written rows of one module; returns the target's table, grown where it must be.
 
-    Args:
-        source: the source's table.
-        target: the target's, written in place where it has room.
-        image: where keys go.
-        parts: first key of each agent in the source and in the target.
+    `image` says where keys go, `parts` the first key of each agent in the source and in the target,
+    which is written in place where it has room.
     """
     keys, places = list_written(source)
     for base, other_base in parts:
@@ -348,11 +342,7 @@ def _make(
 
 def list_vetoes(training: Training) -> set[tuple[int, int]]:
     """Returns all vetoed pairs of a veto module's state and an action."""
-    table, n_actions = training.memory.vetoes, training.task.n_actions
-    vetoes: set[tuple[int, int]] = set()
-    hashed = len(table.keys) > 0
-    for row in np.flatnonzero(table.rows[:-1, 0]).tolist():
-        key = int(table.keys[row]) - 1 if hashed else row
-        bits = int(table.rows[row, 0])
-        vetoes |= {(key, action) for action in range(n_actions) if bits >> action & 1}
-    return vetoes
+    table = training.memory.vetoes
+    keys, places = list_written(table)
+    bits = table.rows[places, 0, None] >> np.arange(training.task.n_actions) & 1
+    return {(int(keys[k]), int(action)) for k, action in np.argwhere(bits)}

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hose_mj.rollout.planning import FreeCells, GoalPlan
+from hose_mj.rollout.policies import FreeCells, GoalPlan
 from hose_mj.rollout.scripts import Player, Script, move, relax
 from hose_mj.world.actions import compute_centres
 from hose_mj.world.driving import Driver

@@ -10,14 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_layout import (
-    ChainKind,
-    ChainLayout,
-    conjugate,
-    multiply,
-    rotation_matrix,
-)
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings, check_obstacles
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
@@ -111,13 +105,8 @@ class CableHose(MujocoChainHose):
         super().__init__(spec, BallJoints(spec, twist), settings)
 
 
-class BallJoints(ChainKind):
-    """The composite cable's joints.
-
-    Args:
-        spec: what the hose is made of.
-        torsional_stiffness: GJ (N m^2).
-    """
+class BallJoints(chain_layout.ChainKind):
+    """The composite cable's joints; `torsional_stiffness` is GJ (N m^2)."""
 
     def __init__(self, spec: HoseSpec, torsional_stiffness: float) -> None:
         self.spec = spec
@@ -126,7 +115,7 @@ class BallJoints(ChainKind):
         self.twists = True
 
     def make_chain(
-        self, layout: ChainLayout, root: tuple[Array, Array] | None
+        self, layout: chain_layout.ChainLayout, root: tuple[Array, Array] | None
     ) -> tuple[mujoco.MjSpec, list[Any]]:
         """The composite, with its nodes (single precision in MuJoCo's compiler) set exactly."""
         h, second_moment = layout.segment_length, math.pi * self.spec.outer_radius**4 / 4
@@ -148,13 +137,15 @@ class BallJoints(ChainKind):
 
     def to_qpos(self, start: Array, frames: Array, rooted: bool) -> Array:
         """Free joint unless rooted, then one quaternion per ball joint."""
-        relative = multiply(conjugate(frames[:-1]), frames[1:]).ravel()
+        relative = chain_layout.multiply(chain_layout.conjugate(frames[:-1]), frames[1:]).ravel()
         return relative if rooted else np.concatenate([start, frames[0], relative])
 
     def to_qvel(self, velocity: Array, spins: Array, frames: Array, rooted: bool) -> Array:
         """Velocity in the world frame, spins relative to the segment before in the own frame."""
         change = np.concatenate([spins[:1], np.diff(spins, axis=0)])
-        own = [rotation_matrix(q).T @ spin for q, spin in zip(frames, change, strict=True)]
+        own = [
+            chain_layout.rotation_matrix(q).T @ spin for q, spin in zip(frames, change, strict=True)
+        ]
         return np.concatenate([*own[1:]] if rooted else [velocity, *own])
 
     def spread(self, force: Array, axes: Array, rooted: bool) -> Array:
@@ -168,9 +159,3 @@ class BallJoints(ChainKind):
     def freedoms(self, segments: int, rooted: bool) -> Array:
         """All, but for a root those of the first segment."""
         return np.eye(3 + 3 * segments)[6 if rooted else 0 :]
-
-    def check_points(self, name: str, points: Array) -> None:
-        """Any point will do."""
-
-    def check_tangent(self, tangent: Array) -> None:
-        """Any direction will do."""

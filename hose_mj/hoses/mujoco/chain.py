@@ -11,35 +11,22 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.mujoco.chain_holds import (
-    Held,
-    Load,
-    add_equality,
-    check_segments,
-    compute_equality_reaction,
-    compute_root_reaction,
-    make_layout,
-)
+from hose_mj.hoses.mujoco import chain_holds
+from hose_mj.hoses.mujoco.chain_holds import Held, Load
 from hose_mj.hoses.mujoco.chain_layout import (
     ChainKind,
     ChainLayout,
+    ChainMass,
+    ChainMotion,
     rotation_matrix,
     transport_frames,
     turn_frame,
 )
-from hose_mj.hoses.mujoco.chain_motion import ChainMass, ChainMotion
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings, add_obstacles
-from hose_mj.hoses.mujoco.chain_statics import (
-    BodyPoint,
-    ChainSystem,
-    StaticChain,
-    StaticHold,
-    StaticLoad,
-)
 from hose_mj.hoses.mujoco.hose import MujocoHose
-from hose_mj.hoses.mujoco.model import Motion, MujocoModel
-from hose_mj.hoses.mujoco.statics import linearize, solve_equilibrium
-from hose_mj.hoses.protocol import Array, Energies, Linearization, Momentum, Reaction
+from hose_mj.hoses.mujoco.model import MujocoModel
+from hose_mj.hoses.mujoco.statics import BodyPoint, ChainSystem, StaticChain, solve_equilibrium
+from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 _ADVICE = (
@@ -48,30 +35,28 @@ _ADVICE = (
 )
 
 
-class ChainModel(MujocoModel):
-    """A compiled chain with its holds.
+class ChainModel(MujocoModel[ChainMotion]):
+    """A compiled chain with what holds it; a rigid hold holds the first segment.
 
-    Args:
-        kind: what the joints are.
-        spec: what the hose is made of.
-        settings: numerics.
-        held: what holds it; a rigid one holds the first segment.
-
-    Attributes:
-        layout: arc lengths of the nodes.
-        bodies: body ids of the segments (N,).
-        mass: of the segments.
+    `bodies` (N,) are the body ids of the segments.
     """
+
+    layout: ChainLayout
 
     def __init__(
         self, kind: ChainKind, spec: HoseSpec, settings: ChainSettings, held: Sequence[Held]
     ) -> None:
-        self.kind = kind
-        correct = settings.clamp_correction
-        self.layout = make_layout(spec.length, settings.segments, held, clamp_correction=correct)
+        self.kind, self.stiffness = kind, kind.stiffness
+        clamped = {item.hold.arc_length for item in held if item.hold.fixes_tangent}
+        ends = [settings.clamp_correction and end in clamped for end in (0.0, spec.length)]
+        self.layout = ChainLayout(spec.length, settings.segments, *ends)
         self.mass = ChainMass.of_hose(self.layout, spec.linear_density, spec.outer_radius)
         self.rooted = any(item.rigid for item in held)
-        root = next((self._root_pose(item) for item in held if item.rigid), None)
+        root = None  # first node and frame of a first segment that is part of the world
+        for item in held:
+            if item.rigid:
+                tangent = rotation_matrix(item.frame)[:, 0]
+                root = item.position + self.layout.nodes[0] * tangent, item.frame
         maker, bodies = kind.make_chain(self.layout, root)
         settings.apply(maker.option)
         add_obstacles(maker, bodies, settings.obstacles, settings.timestep)
@@ -79,8 +64,8 @@ class ChainModel(MujocoModel):
         for item in held:
             if not item.rigid:
                 (index,), (along,) = self.layout.locate(np.array([item.hold.arc_length]))
-                add_equality(maker, bodies[index], along, item, settings.hold_options())
-        check_segments(self.layout, held)
+                chain_holds.add_equality(maker, bodies[index], along, item, settings.hold_options())
+        chain_holds.check_segments(self.layout, held)
         try:
             model = maker.compile()
         except ValueError as error:
@@ -89,12 +74,6 @@ class ChainModel(MujocoModel):
             raise InputError("linear_density", spec.linear_density, valid) from error
         super().__init__(model, settings.lead, _ADVICE)
         self.bodies = np.array([self.model.body(body.name).id for body in bodies])
-        self._motion: ChainMotion | None = None
-
-    def _root_pose(self, held: Held) -> tuple[Array, Array]:
-        """First node and frame of a first segment that a clamp at s = 0 makes part of the world."""
-        tangent = rotation_matrix(held.frame)[:, 0]
-        return held.position + self.layout.nodes[0] * tangent, held.frame
 
     def point(self, arc_length: float) -> BodyPoint:
         """The body and place in it of a point of the hose."""
@@ -109,11 +88,6 @@ class ChainModel(MujocoModel):
         self.data.qvel[:] = self.kind.to_qvel(velocity, spins, frames, self.rooted)
         self.forget()
 
-    @property
-    def nodes(self) -> Array:
-        """Rest arc lengths of the nodes (N + 1,), m; the first may be below 0."""
-        return self.layout.nodes
-
     def lay(self, points: Array, speeds: Array | None) -> None:
         """The first node is on its point; each segment points along the chord of its nodes."""
         still = np.zeros((self.layout.segments, 3))
@@ -122,9 +96,8 @@ class ChainModel(MujocoModel):
         if speeds is not None:
             self.fit_velocity(speeds)
 
-    def take_over(self, old: Motion, held: Sequence[Held]) -> None:
+    def take_over(self, old: ChainMotion, held: Sequence[Held]) -> None:
         """Lays and moves the chain as another one; a rigid clamp's target comes first."""
-        assert isinstance(old, ChainMotion)
         layout = self.layout
         nearest, _ = old.layout.locate((layout.nodes[:-1] + layout.nodes[1:]) / 2)
         points = old.position(layout.nodes)
@@ -151,18 +124,11 @@ class ChainModel(MujocoModel):
         self.data.qvel[:] = np.linalg.lstsq(system, speeds.ravel(), rcond=1e-10)[0]
         self.forget()
 
-    def motion(self) -> ChainMotion:
-        """How the chain lies and moves now."""
-        if self._motion is None:
-            self._motion = ChainMotion.read(self.model, self.data, self.layout, self.bodies)
-        return self._motion
+    def _read_motion(self) -> ChainMotion:
+        return ChainMotion.read(self.model, self.data, self.layout, self.bodies)
 
     def update_forces(self, loads: Sequence[Load]) -> None:
-        """Computes the forces of constraints and joints for the present state.
-
-        After `settle` they are those of the exact equilibrium; MuJoCo's equality constraints, soft
-        as they are, would let go a little first.
-        """
+        """Computes the forces of constraints and joints; see `MujocoModel.update_forces`."""
         if self._forces_known:
             return
         flags = self.model.opt.disableflags
@@ -177,9 +143,11 @@ class ChainModel(MujocoModel):
     def reaction(self, held: Held) -> Reaction:
         """What the world or an equality constraint does to the chain."""
         if held.rigid:
-            return compute_root_reaction(self.data, held, int(self.bodies[0]))
+            wrench = self.data.cfrc_int[self.bodies[0]]
+            arm = self.data.subtree_com[self.bodies[0]] - held.position
+            return Reaction(wrench[3:].copy(), wrench[:3] + np.cross(arm, wrench[3:]))
         body = self.point(held.hold.arc_length).body
-        return compute_equality_reaction(self.model, self.data, held, body)
+        return chain_holds.compute_equality_reaction(self.model, self.data, held, body)
 
     def tension(self, arc_lengths: Array) -> Array:
         """Axial force in the joints, straight lines between and beyond them."""
@@ -195,20 +163,6 @@ class ChainModel(MujocoModel):
         tangents = motion.tangent(self.layout.nodes[1:-1])
         return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
 
-    def energies(self) -> Energies:
-        """Energies at the present state; `stretching` is 0."""
-        gravity = self.model.opt.gravity
-        return self.motion().energies(self.mass, self.kind.stiffness, gravity)
-
-    def momentum(self) -> Momentum:
-        """Linear and angular momentum at the present state."""
-        return self.motion().momentum(self.mass)
-
-    def forget(self) -> None:
-        """Drops what was computed for an earlier state."""
-        super().forget()
-        self._motion = None
-
     def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
         """Moves to static equilibrium, velocity zero."""
         system = self._static_system(held, loads)
@@ -218,18 +172,10 @@ class ChainModel(MujocoModel):
         self.data.qvel[:], self.data.qacc_warmstart[:] = 0.0, 0.0
         self.keep_settled(multipliers, held)
 
-    def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
-        """Small motions about the present pose."""
-        return linearize(self._static_system(held, loads))
-
     # What acts on it, and steps.
 
     def write_targets(self, held: Sequence[Held], lead: float = 0.0) -> None:
-        """Sets the poses of the bodies that equality constraints hold the hose to.
-
-        MuJoCo takes these bodies to be at rest, so a hold lags behind one that moves; `lead` steps
-        ahead of its target it is in time.
-        """
+        """Sets the poses of the bodies that hold the hose; see `MujocoModel.write_targets`."""
         for item in held:
             if not item.rigid:
                 place = self.model.body(f"target{item.hold.number}").mocapid[0]
@@ -249,17 +195,8 @@ class ChainModel(MujocoModel):
             self.data.xfrc_applied[point.body, 3:] += load.moment + np.cross(arm, load.force)
 
     def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> ChainSystem:
-        """The equations of equilibrium from the present pose on."""
-        holds = [
-            StaticHold(
-                self.point(item.hold.arc_length),
-                item.position,
-                item.frame if item.hold.fixes_tangent else None,
-            )
-            for item in held
-            if not item.rigid
-        ]
-        forces = [StaticLoad(self.point(x.arc_length), x.force, x.moment) for x in loads]
+        holds = [(self.point(x.hold.arc_length), x) for x in held if not x.rigid]
+        forces = [(self.point(load.arc_length), load) for load in loads]
         chain = StaticChain(self.kind, self.model, self.bodies, self.rooted, self.layout)
         motion = self.motion()
         return ChainSystem(chain, motion.starts[0], motion.frames, holds, forces)
@@ -277,14 +214,10 @@ class MujocoChainHose(MujocoHose):
     Static holds are exact. Unstable equilibria are left, but not by a shape exactly in one, and not
     where a moment acts. `linearize` has the first node and the rotation vectors of the segments, in
     the world frame, without those of a first segment that is part of the world.
-
-    Attributes:
-        settings: numerics.
-        segments: number of rigid segments.
-        layout: arc lengths of the nodes; another one after each change of holds.
     """
 
     _model: ChainModel
+    layout: ChainLayout
 
     def __init__(self, spec: HoseSpec, kind: ChainKind, settings: ChainSettings) -> None:
         check_plain(type(self).__name__, spec)
@@ -292,19 +225,9 @@ class MujocoChainHose(MujocoHose):
         super().__init__(spec, rotation_matrix(kind.base_frame)[:, 0])
 
     @property
-    def timestep(self) -> float:
-        """Length of one step (s)."""
-        return self.settings.timestep
-
-    @property
     def segments(self) -> int:
         """Number of rigid segments."""
         return self.settings.segments
-
-    @property
-    def layout(self) -> ChainLayout:
-        """Arc lengths of the nodes; another one after each change of holds."""
-        return self._model.layout
 
     @property
     def twists(self) -> bool:

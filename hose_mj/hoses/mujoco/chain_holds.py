@@ -10,28 +10,17 @@ import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.mujoco.chain_layout import (
-    ChainLayout,
-    conjugate,
-    exponential,
-    multiply,
-    rotation_vector,
-)
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.protocol import Array, Hold, Reaction
 
 
 @dataclass(frozen=True)
 class Held:
-    """A hold and where it is to be.
+    """A hold and where it is to be: a point (3,), m, and a frame (4,) that attachments ignore.
 
-    Attributes:
-        hold: the user's handle.
-        position: target of the point (3,), m.
-        frame: target of the segment's frame (4,); an attachment ignores it.
-        last_position: target of the step before.
-        last_frame: target of the step before.
-        rigid: the first segment is part of the world, else an equality constraint holds it.
-        spun: sum of the spins since the step before (rad).
+    `last_position` and `last_frame` are those of the step before, `spun` is the sum of the spins
+    since then (rad). Where it is `rigid` the first segment is part of the world, else an equality
+    constraint holds it.
     """
 
     hold: Hold
@@ -73,9 +62,11 @@ class Held:
 
     def ahead(self, steps: float) -> tuple[Array, Array]:
         """Pose that a target moving on as in this step reaches so many steps later."""
-        turn = rotation_vector(multiply(self.frame, conjugate(self.last_frame)))
+        turn = chain_layout.rotation_vector(
+            chain_layout.multiply(self.frame, chain_layout.conjugate(self.last_frame))
+        )
         position = self.position + steps * (self.position - self.last_position)
-        return position, multiply(exponential(steps * turn), self.frame)
+        return position, chain_layout.multiply(chain_layout.exponential(steps * turn), self.frame)
 
 
 @dataclass(frozen=True)
@@ -108,14 +99,8 @@ def add_equality(
 ) -> None:
     """Ties a point of a segment to a mocap body: a weld for a clamp, else a connect.
 
-    A weld also holds the twist of the segment, which the tangent alone would leave free.
-
-    Args:
-        spec: model that is being made.
-        body: the segment.
-        along: distance of the point from the segment's first node (m).
-        held: what holds it.
-        options: solref and solimp of the constraint.
+    A weld also holds the twist of the segment, which the tangent alone would leave free. The point
+    is `along` from the segment's first node (m); `options` are solref and solimp of the constraint.
     """
     number = held.hold.number
     body.add_site(name=f"held{number}", pos=[along, 0, 0])
@@ -162,24 +147,7 @@ def find_rows(data: mujoco.MjData, equality: int) -> np.ndarray:
     )
 
 
-def compute_root_reaction(data: mujoco.MjData, held: Held, body: int) -> Reaction:
-    """Returns what the world does to the first segment that is part of it."""
-    wrench = data.cfrc_int[body]
-    force = wrench[3:].copy()
-    arm = data.subtree_com[body] - held.position
-    return Reaction(force, wrench[:3] + np.cross(arm, force))
-
-
-def make_layout(
-    length: float, segments: int, held: Sequence[Held], *, clamp_correction: bool
-) -> ChainLayout:
-    """Returns the layout that clamps at the ends ask for."""
-    clamped = {item.hold.arc_length for item in held if item.hold.fixes_tangent}
-    first, last = clamp_correction and 0.0 in clamped, clamp_correction and length in clamped
-    return ChainLayout(length, segments, first, last)
-
-
-def check_segments(layout: ChainLayout, held: Sequence[Held]) -> None:
+def check_segments(layout: chain_layout.ChainLayout, held: Sequence[Held]) -> None:
     """Raises `InputError` for two holds on one rigid segment."""
     arc_lengths = np.array([item.hold.arc_length for item in held])
     index, _ = layout.locate(arc_lengths)

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_choice, check_count, check_vector
+from hose_mj.errors import InputError, check_choice
+from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
@@ -22,22 +22,7 @@ JACOBIANS = ("auto", "dense", "sparse")
 
 @dataclass(frozen=True, kw_only=True)
 class ChainSettings:
-    """Settings that both chains share.
-
-    Attributes:
-        timestep: length of one step (s).
-        gravity: (3,) m/s^2.
-        segments: number of rigid segments, at least 2.
-        integrator: one of `INTEGRATORS`, MuJoCo's names.
-        clamp_correction: centre the segment of a clamped end on that end (see `ChainLayout`).
-        iterations: most iterations of MuJoCo's constraint solver.
-        tolerance: its termination tolerance.
-        jacobian: one of `JACOBIANS`.
-        hold_solref: MuJoCo's solref of clamps and attachments; None for a time constant of two
-            steps, critically damped.
-        hold_solimp: their solimp.
-        obstacles: what the chain collides with.
-    """
+    """Settings that all hoses inside an mjModel share; `CableHose` says what they are."""
 
     timestep: float
     gravity: ArrayLike

@@ -8,36 +8,30 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hose_mj.hoses.mujoco import flex_rod
 from hose_mj.hoses.mujoco.chain import check_plain
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, find_rows
 from hose_mj.hoses.mujoco.chain_layout import rotation_matrix
 from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion, interpolate
-from hose_mj.hoses.mujoco.flex_rod import BALLAST, FlexSettings, add_connect, make_rod, name_hold
-from hose_mj.hoses.mujoco.flex_statics import FlexProblem, FlexSystem, spread_loads
+from hose_mj.hoses.mujoco.flex_rod import FlexSettings
 from hose_mj.hoses.mujoco.hose import MujocoHose
-from hose_mj.hoses.mujoco.model import Motion, MujocoModel
-from hose_mj.hoses.mujoco.statics import linearize, solve_equilibrium
-from hose_mj.hoses.protocol import Array, Energies, Linearization, Momentum, Reaction
+from hose_mj.hoses.mujoco.model import MujocoModel
+from hose_mj.hoses.mujoco.statics import solve_equilibrium
+from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 _ADVICE = "try a smaller timestep, or softer edges and holds"
 
 
-class FlexModel(MujocoModel):
+class FlexModel(MujocoModel[FlexMotion]):
     """A compiled flex rod with its holds.
 
     Each vertex is a body on three slides; it is laid out along x from the world's origin, because
-    MuJoCo takes the shape at qpos = 0 for the one without bending.
-
-    Args:
-        spec: what the hose is made of.
-        settings: numerics.
-        held: what holds it.
-
-    Attributes:
-        layout: arc lengths of the vertices.
-        masses: of the vertices (N + 1,), kg.
+    MuJoCo takes the shape at qpos = 0 for the one without bending. `mass` is that of the vertices
+    (N + 1,), kg.
     """
+
+    layout: FlexLayout
 
     def __init__(self, spec: HoseSpec, settings: FlexSettings, held: Sequence[Held]) -> None:
         holds = [item.hold for item in held]
@@ -45,27 +39,26 @@ class FlexModel(MujocoModel):
         self.layout = FlexLayout.of_holds(
             spec.length, settings.segments, holds, clamp_correction=correct
         )
-        self.masses = self.layout.compute_masses(spec.linear_density)
-        self._bending_stiffness = spec.bending_stiffness
-        self._rest = np.zeros((len(self.masses), 3))
+        self.mass = self.layout.compute_masses(spec.linear_density)
+        self.stiffness = spec.bending_stiffness
+        self._rest = np.zeros((len(self.mass), 3))
         self._rest[:, 0] = self.layout.nodes
-        maker = make_rod(spec, self._rest, self.masses, settings.edge_options())
+        maker = flex_rod.make_rod(spec, self._rest, self.mass, settings.edge_options())
         settings.apply(maker.option)
-        self._ballast = BALLAST * spec.mass
+        self._ballast = flex_rod.BALLAST * spec.mass
         for item in held:
             for vertex in self.layout.find_vertices(item.hold):
-                add_connect(maker, item, vertex, self._ballast, settings.hold_options())
+                flex_rod.add_connect(maker, item, vertex, self._ballast, settings.hold_options())
         super().__init__(maker.compile(), settings.lead, _ADVICE)
         self._scratch = mujoco.MjData(self.model)
-        self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.masses))])
-        self._free = self._find_free_edges(held)
-        self._motion: FlexMotion | None = None
+        self._bodies = np.array([self.model.body(f"v{k}").id for k in range(len(self.mass))])
+        self._free = np.ones(len(self.layout.edges), dtype=bool)
+        for item in held:
+            if item.hold.fixes_tangent:
+                self._free[self.layout.find_vertices(item.hold)[0]] = False
+        if not self._free.any():
+            self._free[:] = True
         self._tensions = np.zeros(len(self.layout.edges))
-
-    @property
-    def nodes(self) -> Array:
-        """Rest arc lengths of the vertices (N + 1,), m."""
-        return self.layout.nodes
 
     # State.
 
@@ -84,30 +77,21 @@ class FlexModel(MujocoModel):
             edge = np.arange(len(chords))
             rows[edge, edge], rows[edge, edge + 1] = -chords, chords
             flat = rows.reshape(len(chords), -1)
-            lighter = flat / np.repeat(self.masses, 3)
+            lighter = flat / np.repeat(self.mass, 3)
             impulse = np.linalg.solve(flat @ lighter.T, flat @ speeds.ravel())
             velocities = speeds - (impulse @ lighter).reshape(-1, 3)
         self._set_state(vertices, velocities)
 
-    def take_over(self, old: Motion, held: Sequence[Held]) -> None:
+    def take_over(self, old: FlexMotion, held: Sequence[Held]) -> None:
         """Lays the rod where another one is; to the bit where its vertices are the same."""
-        assert isinstance(old, FlexMotion)
         if np.array_equal(old.layout.nodes, self.layout.nodes):
             self._set_state(old.vertices, old.velocities)
         else:
             self.lay(old.position(self.layout.nodes), old.velocity(self.layout.nodes))
 
-    def motion(self) -> FlexMotion:
-        """How the rod lies and moves now."""
-        if self._motion is None:
-            vertices = self._rest + self.data.qpos.reshape(-1, 3)
-            self._motion = FlexMotion(self.layout, vertices, self.data.qvel.reshape(-1, 3).copy())
-        return self._motion
-
-    def forget(self) -> None:
-        """Drops what was computed for an earlier state."""
-        super().forget()
-        self._motion = None
+    def _read_motion(self) -> FlexMotion:
+        vertices = self._rest + self.data.qpos.reshape(-1, 3)
+        return FlexMotion(self.layout, vertices, self.data.qvel.reshape(-1, 3).copy())
 
     def _set_state(self, vertices: Array, velocities: Array) -> None:
         self.data.qpos[:] = (vertices - self._rest).ravel()
@@ -127,7 +111,9 @@ class FlexModel(MujocoModel):
     def reaction(self, held: Held) -> Reaction:
         """Sum of what the constraints of a hold do to its vertices."""
         vertices = self.layout.find_vertices(held.hold)
-        forces = np.stack([self._find_rows(name_hold(held, vertex)) for vertex in vertices])
+        forces = np.stack(
+            [self._find_rows(flex_rod.name_hold(held, vertex)) for vertex in vertices]
+        )
         forces -= self._ballast * self.data.qacc.reshape(-1, 3)[vertices]
         return self._add_up(held, forces)
 
@@ -143,28 +129,19 @@ class FlexModel(MujocoModel):
         """Zero: nothing twists."""
         return np.zeros(len(arc_lengths))
 
-    def energies(self) -> Energies:
-        """Energies at the present state; `stretching` is 0, edges being constraints."""
-        gravity = self.model.opt.gravity
-        return self.motion().energies(self.masses, self._bending_stiffness, gravity)
-
-    def momentum(self) -> Momentum:
-        """Linear and angular momentum at the present state."""
-        return self.motion().momentum(self.masses)
-
     def write_targets(self, held: Sequence[Held], lead: float = 0.0) -> None:
         """Sets the bodies that hold vertices, `lead` steps ahead of where they are to be."""
         for item in held:
             vertices = self.layout.find_vertices(item.hold)
             for vertex, where in zip(vertices, self._find_targets(item, lead), strict=True):
-                place = self.model.body(f"target-{name_hold(item, vertex)}").mocapid[0]
+                place = self.model.body(f"target-{flex_rod.name_hold(item, vertex)}").mocapid[0]
                 self.data.mocap_pos[place] = where
 
     def write_loads(self, loads: Sequence[Load]) -> None:
         """Sets the forces on the vertices for this pose."""
         self.data.xfrc_applied[:] = 0.0
         if loads:
-            forces = spread_loads(self.layout, self.motion().vertices, tuple(loads))
+            forces = flex_rod.spread_loads(self.layout, self.motion().vertices, tuple(loads))
             self.data.xfrc_applied[self._bodies, :3] = forces
 
     def _run(self, n_steps: int, loads: Sequence[Load]) -> None:
@@ -195,24 +172,20 @@ class FlexModel(MujocoModel):
         self.keep_settled(np.concatenate(wrenches), held)
         self._tensions, self._forces_known = -multipliers[:count], True
 
-    def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
-        """Small motions about the present pose; edges are among the constraints."""
-        return linearize(self._static_system(held, loads))
-
-    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> FlexSystem:
+    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> flex_rod.FlexSystem:
         vertices = [self.layout.find_vertices(item.hold) for item in held]
         targets = [self._find_targets(item, 0.0) for item in held]
-        problem = FlexProblem(
+        problem = flex_rod.FlexProblem(
             self.layout,
-            self.masses,
+            self.mass,
             np.array(self.model.opt.gravity),
-            self._bending_stiffness,
+            self.stiffness,
             self._compute_bending,
             np.concatenate([np.zeros(0, dtype=np.int64), *vertices]),
             np.concatenate([np.zeros((0, 3)), *targets]),
             tuple(loads),
         )
-        return FlexSystem(problem, self.motion().vertices)
+        return flex_rod.FlexSystem(problem, self.motion().vertices)
 
     def _compute_bending(self, vertices: Array) -> Array:
         """MuJoCo's bending forces (N + 1, 3), N, at rest."""
@@ -239,13 +212,6 @@ class FlexModel(MujocoModel):
         """Forces of an equality constraint's rows."""
         return np.array(self.data.efc_force[find_rows(self.data, self.model.equality(name).id)])
 
-    def _find_free_edges(self, held: Sequence[Held]) -> np.ndarray:
-        free = np.ones(len(self.layout.edges), dtype=bool)
-        for item in held:
-            if item.hold.fixes_tangent:
-                free[self.layout.find_vertices(item.hold)[0]] = False
-        return free if free.any() else ~free
-
     def _add_up(self, held: Held, forces: Array) -> Reaction:
         """Forces on a hold's vertices as force and moment about its target."""
         if not held.hold.fixes_tangent:
@@ -266,27 +232,16 @@ class FlexHose(MujocoHose):
     clamp two; where a new one moves the vertices, the shape between them is cut off anew. In
     statics and in `linearize`, whose coordinates are the vertices, edges and holds are rigid.
 
-    Args:
-        spec: what the hose is made of.
-        timestep: length of one step (s).
-        gravity: (3,) m/s^2.
-        segments: number of edges, at least 2; holds that are no vertex may change it by a few.
-        clamp_correction: False for a clamp at an end that holds the first two vertices; True
-            centres them on the end.
-        iterations: most iterations of MuJoCo's constraint solver.
-        tolerance: its termination tolerance.
-        jacobian: dense, sparse or auto; sparse took a tenth less time for a held rod of 20 edges
-            and two thirds less for one of 80.
-        edge_solref: MuJoCo's solref of the edges; None for that of holds.
-        edge_solimp: their solimp.
-        hold_solref: solref of holds; None for twice the time step, critically damped.
-        hold_solimp: their solimp.
-
-    Raises:
-        InputError: a value outside its valid set.
+    Arguments are those of `CableHose`. Segments are edges here; holds that are no vertex may change
+    their number by a few. A clamp at an end holds the first two vertices, which `clamp_correction`
+    centres on the end. A sparse Jacobian took a tenth less time for a held rod of 20 edges and two
+    thirds less for one of 80. `edge_solref`, None for that of holds, and `edge_solimp` are MuJoCo's
+    of the edges.
     """
 
     _model: FlexModel
+    layout: FlexLayout
+    settings: FlexSettings
 
     def __init__(
         self,
@@ -320,16 +275,6 @@ class FlexHose(MujocoHose):
             edge_solimp=edge_solimp,
         )
         super().__init__(spec, np.array([1.0, 0.0, 0.0]))
-
-    @property
-    def timestep(self) -> float:
-        """Length of one step (s)."""
-        return self.settings.timestep
-
-    @property
-    def layout(self) -> FlexLayout:
-        """Arc lengths of the vertices; another one after each change of holds."""
-        return self._model.layout
 
     def stretch(self) -> Array:
         """Strain of the edges (N,); 0 if MuJoCo's constraints were rigid."""

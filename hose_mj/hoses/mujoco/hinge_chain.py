@@ -9,17 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_choice
+from hose_mj.errors import InputError, check_choice
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain import MujocoChainHose
-from hose_mj.hoses.mujoco.chain_layout import (
-    ChainKind,
-    ChainLayout,
-    conjugate,
-    multiply,
-    rotation_matrix,
-    rotation_vector,
-)
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
@@ -36,30 +28,11 @@ PLANE_FRAMES = {
 class HingeChainHose(MujocoChainHose):
     """Rigid segments, hinges and joint springs EI / h: the form most favourable to MuJoCo.
 
-    For validation only: it moves in one plane through the world's origin, without contacts. Its
-    springs are MuJoCo's own, so the integrator "discrete" takes them implicitly. Kelvin-Voigt
-    damping is joint damping tau EI / h. Not mapped: stretching (inextensible), twist, drag,
-    rest_strain and rest_curvature (the last three are errors unless 0). Forces and holds act in the
-    plane only.
-
-    Args:
-        spec: what the hose is made of.
-        timestep: length of one step (s).
-        gravity: (3,) m/s^2.
-        segments: number of rigid segments, at least 2.
-        plane: xy, xz or yz.
-        integrator: euler, implicit, implicitfast, discrete or rk4.
-        clamp_correction: False for a clamp that fixes a whole first segment; True centres the
-            segment of a clamped end on that end.
-        iterations: most iterations of MuJoCo's constraint solver.
-        tolerance: its termination tolerance.
-        jacobian: dense, sparse or auto; MuJoCo's auto is sparse from 60 coordinates on, which
-            makes a hose that is held twice as slow.
-        hold_solref: MuJoCo's solref of holds; None for twice the time step, critically damped.
-        hold_solimp: their solimp.
-
-    Raises:
-        InputError: a value outside its valid set.
+    For validation only: it moves in one plane (xy, xz or yz) through the world's origin, without
+    contacts. Its springs are MuJoCo's own, so the integrator "discrete" takes them implicitly.
+    Kelvin-Voigt damping is joint damping tau EI / h. Not mapped: stretching (inextensible), twist,
+    drag, rest_strain and rest_curvature (the last three are errors unless 0). Forces and holds act
+    in the plane only. All other arguments are those of `CableHose`.
     """
 
     def __init__(
@@ -94,23 +67,18 @@ class HingeChainHose(MujocoChainHose):
         super().__init__(spec, HingeJoints(spec, plane), settings)
 
 
-class HingeJoints(ChainKind):
-    """Hinges normal to a plane.
-
-    Args:
-        spec: what the hose is made of.
-        plane: a key of `PLANE_FRAMES`.
-    """
+class HingeJoints(chain_layout.ChainKind):
+    """Hinges normal to a plane, a key of `PLANE_FRAMES`."""
 
     def __init__(self, spec: HoseSpec, plane: str) -> None:
         self.spec, self.plane = spec, plane
         self.base_frame = PLANE_FRAMES[plane]
         self.stiffness = (0.0, spec.bending_stiffness)
         self.twists = False
-        self._axes = rotation_matrix(self.base_frame)
+        self._axes = chain_layout.rotation_matrix(self.base_frame)
 
     def make_chain(
-        self, layout: ChainLayout, root: tuple[Array, Array] | None
+        self, layout: chain_layout.ChainLayout, root: tuple[Array, Array] | None
     ) -> tuple[mujoco.MjSpec, list[Any]]:
         """Bodies B_0, B_1, ...; without a root two slides and a hinge carry the first."""
         h, maker = layout.segment_length, mujoco.MjSpec()
@@ -137,10 +105,14 @@ class HingeJoints(ChainKind):
 
     def to_qpos(self, start: Array, frames: Array, rooted: bool) -> Array:
         """Two slides and an angle unless rooted, then one angle per hinge."""
-        angles = rotation_vector(multiply(conjugate(frames[:-1]), frames[1:]))[:, 2]
+        angles = chain_layout.rotation_vector(
+            chain_layout.multiply(chain_layout.conjugate(frames[:-1]), frames[1:])
+        )[:, 2]
         if rooted:
             return angles
-        first = rotation_vector(multiply(conjugate(self.base_frame), frames[0]))[2]
+        first = chain_layout.rotation_vector(
+            chain_layout.multiply(chain_layout.conjugate(self.base_frame), frames[0])
+        )[2]
         return np.concatenate([(self._axes.T @ start)[:2], [first], angles])
 
     def to_qvel(self, velocity: Array, spins: Array, frames: Array, rooted: bool) -> Array:

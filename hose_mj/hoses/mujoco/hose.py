@@ -16,27 +16,52 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import (
-    check_arc_lengths,
-    check_count,
-    check_curve_points,
-    check_vector,
-    sample_curve,
-    sample_velocity,
-)
+from hose_mj.hoses import inputs
+from hose_mj.hoses.inputs import check_arc_lengths, check_vector
+from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
-from hose_mj.hoses.mujoco.chain_layout import exponential, multiply, rotation_matrix, turn_frame
+from hose_mj.hoses.mujoco.chain_settings import ChainSettings
+from hose_mj.hoses.mujoco.flex_layout import FlexMotion
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.protocol import Array, Curve, Energies, Hold, Linearization, Momentum, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 
-class MujocoQueries(ABC):
-    """The queries of `HoseModel`, on a compiled model and the loads that act on it."""
+class MujocoHose(ABC):
+    """The `HoseModel` protocol on top of a `MujocoModel`; at first it lies along `straight` (3,).
 
-    spec: HoseSpec
-    _model: MujocoModel
+    `fallbacks` is always 0; hoses with a solver of their own count here.
+    """
+
+    settings: ChainSettings
+    _model: MujocoModel[chain_layout.ChainMotion] | MujocoModel[FlexMotion]
     _loads: list[Load]
+
+    def __init__(self, spec: HoseSpec, straight: Array) -> None:
+        self.spec, self.fallbacks = spec, 0
+        self._next_number = 0
+        self.reset(lambda s: s[:, None] * straight)
+
+    @abstractmethod
+    def _make_model(self, held: Sequence[Held]) -> MujocoModel[Any]:
+        """Compiles the hose with these holds; `InputError` if they are too close to each other."""
+
+    @property
+    def timestep(self) -> float:
+        """Length of one step (s)."""
+        return self.settings.timestep
+
+    @property
+    def layout(self) -> Any:
+        """Arc lengths of the nodes; another one after each change of holds."""
+        return self._model.layout
+
+    @property
+    def twists(self) -> bool:
+        """Whether the hose can turn about its tangent against itself."""
+        return False
+
+    # Queries.
 
     @property
     def time(self) -> float:
@@ -96,52 +121,17 @@ class MujocoQueries(ABC):
     def _arc_lengths(self, arc_length: ArrayLike) -> Array:
         return check_arc_lengths(arc_length, self.spec.length)
 
-
-class MujocoHose(MujocoQueries):
-    """The `HoseModel` protocol on top of a `MujocoModel`.
-
-    Args:
-        spec: what the hose is made of.
-        straight: direction (3,) in which it lies at first.
-
-    Attributes:
-        fallbacks: always 0; hoses with a solver of their own count here.
-    """
-
-    def __init__(self, spec: HoseSpec, straight: Array) -> None:
-        self.spec, self.fallbacks = spec, 0
-        self._next_number = 0
-        self.reset(lambda s: s[:, None] * straight)
-
-    @abstractmethod
-    def _make_model(self, held: Sequence[Held]) -> MujocoModel:
-        """Compiles the hose with these holds.
-
-        Raises:
-            InputError: holds that are too close to each other.
-        """
-
-    @property
-    @abstractmethod
-    def timestep(self) -> float:
-        """Length of one step (s)."""
-
-    @property
-    def twists(self) -> bool:
-        """Whether the hose can turn about its tangent against itself."""
-        return False
-
     # Shape, holds and loads.
 
     def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
         """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads."""
         made = self._make_model([])
-        points = sample_curve(curve, self.spec.length, made.nodes)
-        check_curve_points(points)
+        points = inputs.sample_curve(curve, self.spec.length, made.layout.nodes)
+        inputs.check_curve_points(points)
         points = self._check_points("curve", points)
         speeds = None
         if velocity is not None:
-            speeds = sample_velocity(velocity, self.spec.length, made.nodes)
+            speeds = inputs.sample_velocity(velocity, self.spec.length, made.layout.nodes)
         made.lay(points, speeds)
         self._model, self._held, self._loads = made, list[Held](), list[Load]()
 
@@ -156,7 +146,7 @@ class MujocoHose(MujocoQueries):
         where = self._check_target(s, position)
         frame = self._model.motion().frame(s)
         if tangent is not None:
-            frame = turn_frame(frame, self._check_tangent(tangent))
+            frame = chain_layout.turn_frame(frame, self._check_tangent(tangent))
         return self._add_hold(s, where, frame, fixes_tangent=True)
 
     def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
@@ -190,10 +180,12 @@ class MujocoHose(MujocoQueries):
             name, value = ("spin", spin) if tangent is None else ("tangent", tangent)
             raise InputError(f"{name} of an attachment", value, "only a clamp's to set")
         if tangent is not None:
-            frame = turn_frame(frame, self._check_tangent(tangent))
+            frame = chain_layout.turn_frame(frame, self._check_tangent(tangent))
         spun = held.spun + self._check_spin(held, spin)
         if spin != 0.0:
-            frame = multiply(exponential(spin * rotation_matrix(frame)[:, 0]), frame)
+            frame = chain_layout.multiply(
+                chain_layout.exponential(spin * chain_layout.rotation_matrix(frame)[:, 0]), frame
+            )
         moved = replace(held, position=where, frame=frame, spun=spun)
         if held.rigid and (np.any(where != held.position) or np.any(frame != held.frame)):
             moved = replace(moved, rigid=False)
@@ -239,7 +231,7 @@ class MujocoHose(MujocoQueries):
         Raises:
             StepError: MuJoCo met a NaN or a huge number; the state before the call is kept.
         """
-        if check_count("n_steps", n_steps, 0) == 0:
+        if inputs.check_count("n_steps", n_steps, 0) == 0:
             return
         self._model.step(n_steps, self._held, self._loads)
         self._held = [held.arrived() for held in self._held]

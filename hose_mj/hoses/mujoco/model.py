@@ -5,13 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Generic, TypeVar
 
 import mujoco
 import numpy as np
 
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.mujoco.chain_holds import Held, Load
+from hose_mj.hoses.mujoco.chain_layout import ChainLayout, ChainMotion
+from hose_mj.hoses.mujoco.flex_layout import FlexLayout, FlexMotion
+from hose_mj.hoses.mujoco.statics import StaticSystem, linearize
 from hose_mj.hoses.protocol import Array, Energies, Linearization, Momentum, Reaction
 
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -22,47 +25,27 @@ _BAD = (
 )
 
 
-class Motion(Protocol):
-    """How a hose inside an mjModel lies and moves at one moment; arc lengths are (k,)."""
-
-    def position(self, arc_lengths: Array) -> Array:
-        """Centre line (k, 3), m."""
-        ...
-
-    def velocity(self, arc_lengths: Array) -> Array:
-        """Velocities of the centre line (k, 3), m/s."""
-        ...
-
-    def tangent(self, arc_lengths: Array) -> Array:
-        """Unit tangents (k, 3)."""
-        ...
-
-    def curvature(self, arc_lengths: Array) -> Array:
-        """Bending angle per length (k,), 1/m."""
-        ...
-
-    def twist(self, arc_lengths: Array) -> Array:
-        """Turn about the tangent per length (k,), rad/m."""
-        ...
-
-    def frame(self, arc_length: float) -> Array:
-        """A frame (4,) there whose first axis is the tangent."""
-        ...
+Motion = TypeVar("Motion", ChainMotion, FlexMotion)
+"""How a hose inside an mjModel lies and moves at one moment."""
 
 
-class MujocoModel(ABC):
+class MujocoModel(ABC, Generic[Motion]):
     """A compiled mjModel of one hose and what holds it.
 
-    Args:
-        model: the mjModel.
-        lead: steps by which a moving target must run ahead for a hold to be in time.
-        advice: what to try where the model turns out unstable.
+    A moving target must run ahead by `lead` steps for a hold to be in time; `advice` says what to
+    try where the model turns out unstable.
 
     Attributes:
+        layout: arc lengths of the nodes.
+        mass, stiffness: as the motion's `energies` and `momentum` take them.
         data: its mjData.
         targets_ahead: the bodies that hold the hose may be elsewhere than the holds' targets.
         settled: what each equality constraint does, by hold number, after `settle` only.
     """
+
+    layout: ChainLayout | FlexLayout
+    mass: Any
+    stiffness: Any
 
     def __init__(self, model: mujoco.MjModel, lead: float, advice: str) -> None:
         self.model, self.data = model, mujoco.MjData(model)
@@ -72,13 +55,9 @@ class MujocoModel(ABC):
         self._forces_known = False
         # State before the last step where that moved holds; its targets are those of the data.
         self._replay: Array | None = None
+        self._motion: Motion | None = None
 
     # What each kind of hose says for itself.
-
-    @property
-    @abstractmethod
-    def nodes(self) -> Array:
-        """Rest arc lengths of the nodes (N + 1,), m, ascending."""
 
     @abstractmethod
     def lay(self, points: Array, speeds: Array | None) -> None:
@@ -92,8 +71,8 @@ class MujocoModel(ABC):
         """Lays and moves the hose as another model of it."""
 
     @abstractmethod
-    def motion(self) -> Motion:
-        """How the hose lies and moves now."""
+    def _read_motion(self) -> Motion:
+        """Reads how the hose lies and moves now."""
 
     @abstractmethod
     def update_forces(self, loads: Sequence[Load]) -> None:
@@ -116,20 +95,12 @@ class MujocoModel(ABC):
         """Moment about the tangent (k,), N m, after `update_forces`."""
 
     @abstractmethod
-    def energies(self) -> Energies:
-        """Energies at the present state."""
-
-    @abstractmethod
-    def momentum(self) -> Momentum:
-        """Linear and angular momentum about the world's origin."""
-
-    @abstractmethod
     def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
         """Moves to static equilibrium, velocity zero."""
 
     @abstractmethod
-    def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
-        """Small motions about the present pose."""
+    def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> StaticSystem:
+        """The equations of equilibrium from the present pose on."""
 
     @abstractmethod
     def write_targets(self, held: Sequence[Held], lead: float = 0.0) -> None:
@@ -146,9 +117,28 @@ class MujocoModel(ABC):
     def forget(self) -> None:
         """Drops what was computed for an earlier state."""
         self._forces_known = False
+        self._motion = None
         self.settled = {}
 
     # State and steps.
+
+    def motion(self) -> Motion:
+        """How the hose lies and moves now."""
+        if self._motion is None:
+            self._motion = self._read_motion()
+        return self._motion
+
+    def energies(self) -> Energies:
+        """Energies at the present state; `stretching` is 0."""
+        return self.motion().energies(self.mass, self.stiffness, self.model.opt.gravity)
+
+    def momentum(self) -> Momentum:
+        """Linear and angular momentum about the world's origin."""
+        return self.motion().momentum(self.mass)
+
+    def linearize(self, held: Sequence[Held], loads: Sequence[Load]) -> Linearization:
+        """Small motions about the present pose."""
+        return linearize(self._static_system(held, loads))
 
     def get_numbers(self) -> Array:
         """All of MuJoCo's state that the next steps depend on."""

@@ -21,12 +21,9 @@ _APART = 1e-6
 
 @dataclass(frozen=True)
 class Timed:
-    """A change from `start` on, for `duration`.
+    """A change from `start` on (s), for `duration` (s).
 
-    Attributes:
-        start: s.
-        duration: s.
-        profile: "smooth" (half a cosine: starts and ends at rest) or "linear".
+    Its profile is "smooth" (half a cosine: starts and ends at rest) or "linear".
     """
 
     start: float
@@ -96,7 +93,9 @@ class Grasp:
         here = self.position
         for move in self.moves:
             if move.to is not None:
-                here = _blend(here, move.to, move.progress(time))
+                share = move.progress(time)
+                x, y, z = (a + (b - a) * share for a, b in zip(here, move.to, strict=True))
+                here = x, y, z
         return here
 
     def tangent_at(self, time: float) -> Vector | None:
@@ -237,11 +236,6 @@ def _check_reach(table: TomlTable, one: Grasp, other: Grasp, gap: float) -> None
             valid = f"within {gap:g} m, the hose between them, of the hold at {one.arc_length:g} m"
             where = "position" if time == 0.0 else f"position at {time:g} s"
             raise table.fail(where, [round(x, 6) for x in other.position_at(time)], valid)
-
-
-def _blend(one: Vector, other: Vector, share: float) -> Vector:
-    x, y, z = (a + (b - a) * share for a, b in zip(one, other, strict=True))
-    return x, y, z
 
 
 def turn_towards(one: Vector, other: Vector, share: float) -> Vector:

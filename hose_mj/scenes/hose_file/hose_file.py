@@ -13,14 +13,8 @@ from pathlib import Path
 from hose_mj.assets import find_assets
 from hose_mj.errors import InputError
 from hose_mj.hoses.spec import HoseSpec
-from hose_mj.scenes.hose_file.grasps import (
-    FARTHEST,
-    LONGEST,
-    Grasp,
-    Vector,
-    read_holds,
-    read_place,
-)
+from hose_mj.scenes.hose_file import grasps
+from hose_mj.scenes.hose_file.grasps import FARTHEST, Vector
 from hose_mj.scenes.hose_file.spec import read_spec
 from hose_mj.toml_table import TomlTable, read_toml
 
@@ -68,7 +62,7 @@ class UserHose:
 
     title: str
     spec: HoseSpec
-    holds: tuple[Grasp, ...]
+    holds: tuple[grasps.Grasp, ...]
     loads: tuple[PointLoad, ...]
     gravity: Vector
     floor: Floor | None
@@ -118,14 +112,14 @@ def read_hose_file(path: Path) -> UserHose:
     if hose is None:
         raise file.fail("hose", None, "a table [hose] with length and material or stiffnesses")
     spec = read_spec(hose)
-    holds = read_holds(file, spec)
+    holds = grasps.read_holds(file, spec)
     gravity, loads = _read_loads(file.table("loads"), spec.length)
     floor = _read_floor(file.table("floor"))
     shape = file.points("shape")
     study = file.table("study") or TomlTable({}, path.name, "study")
     duration, start = _read_times(study, holds)
     errors = study.numbers("errors", ERRORS, above=1e-6, most=0.5)
-    budget = study.number("budget", BUDGET, least=1.0, most=LONGEST)
+    budget = study.number("budget", BUDGET, least=1.0, most=grasps.LONGEST)
     study.finish()
     file.finish()
     user = UserHose(
@@ -141,7 +135,8 @@ def read_hose_file(path: Path) -> UserHose:
         errors=tuple(sorted(set(errors), reverse=True)),
         budget=budget,
     )
-    _check_held(user, file)
+    if not holds and (duration is None or start != "as-laid"):  # there is no rest shape
+        raise file.fail("holds", None, "one hold or more, or study.start = 'as-laid'")
     _check_shape(user, file)
     _check_floor(user, file)
     return user
@@ -155,7 +150,7 @@ def _read_loads(table: TomlTable | None, length: float) -> tuple[Vector, tuple[P
         raise table.fail("gravity", list(gravity), "three numbers up to 1e4 m/s^2")
     loads = []
     for part in table.tables("points"):
-        at = read_place(part, length)
+        at = grasps.read_place(part, length)
         force: Vector = part.vector("force", (0.0, 0.0, 0.0))
         moment: Vector = part.vector("moment", (0.0, 0.0, 0.0))
         if not any((*force, *moment)):
@@ -175,26 +170,18 @@ def _read_floor(table: TomlTable | None) -> Floor | None:
     return floor
 
 
-def _read_times(study: TomlTable, holds: tuple[Grasp, ...]) -> tuple[float | None, str]:
+def _read_times(study: TomlTable, holds: tuple[grasps.Grasp, ...]) -> tuple[float | None, str]:
     """Duration and start; what moves is by default followed to the end of its last movement."""
     last = max((change.end for hold in holds for change in hold.changes), default=None)
     duration = last
     if "duration" in study:
-        duration = study.number("duration", above=0.0, most=LONGEST)
+        duration = study.number("duration", above=0.0, most=grasps.LONGEST)
     start: str = study.word("start", STARTS, "as-laid" if last is None else "equilibrium")
     if duration is None and "start" in study:
         raise study.fail("start", start, "left out without a duration: a rest shape has no start")
     if duration is not None and last is None and start == "equilibrium":
         raise study.fail("start", start, "'as-laid' where no hold moves: else nothing happens")
     return duration, start
-
-
-def _check_held(user: UserHose, file: TomlTable) -> None:
-    """There is no rest shape of a hose that nothing holds."""
-    if user.duration is not None and user.start == "as-laid":
-        return
-    if not user.holds:
-        raise file.fail("holds", None, "one hold or more, or study.start = 'as-laid'")
 
 
 def _check_shape(user: UserHose, file: TomlTable) -> None:

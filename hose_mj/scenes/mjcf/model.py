@@ -102,7 +102,9 @@ def inspect_scene(path: Path) -> dict[str, Any]:
             why = " ".join(str(error).removeprefix("Error: ").split())[:300]
             valid = f"MJCF that MuJoCo {mujoco.__version__} compiles ({why})"
             raise InputError("file", file, valid) from error
-    _check_counts(model, file)
+    for name, most in MOST.items():
+        if getattr(model, name) > most:
+            raise InputError(f"{file}: {name}", getattr(model, name), f"at most {most}")
     _check_numbers(model, file)
     data = mujoco.MjData(model)
     reset_to_start(model, data)
@@ -135,12 +137,6 @@ def reset_to_start(model: Any, data: Any) -> None:
         mujoco.mj_resetDataKeyframe(model, data, key)
     else:
         mujoco.mj_resetData(model, data)
-
-
-def _check_counts(model: Any, file: str) -> None:
-    for name, most in MOST.items():
-        if getattr(model, name) > most:
-            raise InputError(f"{file}: {name}", getattr(model, name), f"at most {most}")
 
 
 def _check_numbers(model: Any, file: str) -> None:

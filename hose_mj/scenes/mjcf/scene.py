@@ -68,14 +68,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Place:
-    """A site.
-
-    Attributes:
-        site: its name.
-        body: the name of its body.
-        position: where it is at the start (m).
-        moves: whether its body can move.
-    """
+    """A site in a body, where it is at the start (m), and whether the body can move."""
 
     site: str
     body: str
@@ -240,11 +233,7 @@ def _check_inside(bounds: tuple[Vector, Vector], places: Sequence[Place], file: 
 
 
 def find_one(places: Sequence[Place], name: str, file: str) -> Place:
-    """Returns the one site of a name, with any prefix.
-
-    Raises:
-        InputError: none or several.
-    """
+    """Returns the one site of a name, with any prefix; `InputError` for none or several."""
     found = [place for place in places if _split(place.site, name) is not None]
     if len(found) != 1:
         valid = f"one <site name='{name}'/>, a prefix such as 'arena/' allowed"
@@ -338,17 +327,10 @@ def _check_attachments(
 def read_hose(
     numerics: Mapping[str, Sequence[float]], texts: Mapping[str, str], file: str
 ) -> HoseSpec:
-    """Returns the hose that a scene describes.
+    """Returns the hose that a scene's numerics and texts, by name, describe; `file` names it.
 
     A named material or ready hose gives numbers first, and the scene's numerics replace them.
-
-    Args:
-        numerics: the scene's numerics of `HOSE_NUMERICS` by name.
-        texts: the scene's texts by name.
-        file: name of the scene's file, for messages.
-
-    Raises:
-        InputError: a number out of range, too few of them, or an unknown material.
+    `InputError` is raised for a number out of range, too few of them, or an unknown material.
     """
     given = {
         name: _check_numeric(name, numerics[name], file)

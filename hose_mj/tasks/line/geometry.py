@@ -55,13 +55,10 @@ def compute_covered(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any) -> Any:
 def make_cover_table(reach: int) -> Bytes:
     """Makes the table of what `compute_covered` returns for short segments, from a to b.
 
-    Args:
-        reach: m, the longest segment in it, in cells along an axis.
-
-    Returns:
-        ((2 m + 1)^2, (2 m + 5)^2), by b - a and by the cell's place relative to a: row dx (2 m + 1)
-        + dy and column x (2 m + 5) + y, counted from their middles. What lies beyond the columns is
-        covered no more than the outermost ones, which are zero.
+    With m = reach, the longest segment in it in cells along an axis, it is ((2 m + 1)^2, (2 m +
+    5)^2), by b - a and by the cell's place relative to a: row dx (2 m + 1) + dy and column x (2 m +
+    5) + y, counted from their middles. What lies beyond the columns is covered no more than the
+    outermost ones, which are zero.
     """
     m = reach
     dx, dy, x, y = np.ogrid[-m : m + 1, -m : m + 1, -m - 2 : m + 3, -m - 2 : m + 3]
@@ -79,14 +76,10 @@ def list_offsets(largest_square: int) -> Integers:
 
 
 def make_offset_table(offsets: Integers) -> Integers:
-    """Makes the table from an offset between neighbours to its number.
+    """Makes the table from an offset between neighbours to its number among those allowed (k, 2).
 
-    Args:
-        offsets: the offsets that the hose allows (k, 2).
-
-    Returns:
-        (2 m + 1, 2 m + 1), the offset (0, 0) in the middle, with m = largest coordinate + `MARGIN`.
-        An offset beyond the limit has the number of the nearest one within.
+    It is (2 m + 1, 2 m + 1), the offset (0, 0) in the middle, with m = largest coordinate +
+    `MARGIN`. An offset beyond the limit has the number of the nearest one within.
     """
     m = int(offsets.max()) + MARGIN
     span = np.arange(-m, m + 1)
@@ -98,13 +91,7 @@ def make_offset_table(offsets: Integers) -> Integers:
 def make_distance_table(reach: int, levels: int, squared: bool) -> Integers:
     """Makes the table of distances, rounded down, or their squares, capped at levels - 1.
 
-    Args:
-        reach: largest coordinate of an offset.
-        levels: number of different values.
-        squared: whether the squares are wanted.
-
-    Returns:
-        (2 reach + 1, 2 reach + 1), the offset (0, 0) in the middle.
+    It is (2 reach + 1, 2 reach + 1), the offset (0, 0) in the middle.
     """
     span = range(-reach, reach + 1)
     squares = [[x * x + y * y for y in span] for x in span]

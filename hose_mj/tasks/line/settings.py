@@ -13,16 +13,8 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.tasks.checks import check_cell, check_cells, check_choice, check_finite, check_integer
 from hose_mj.tasks.kernels import Integers
+from hose_mj.tasks.line import geometry
 from hose_mj.tasks.line import kernels as rules
-from hose_mj.tasks.line.geometry import (
-    LARGEST_REACH,
-    N_DIRECTIONS,
-    list_offsets,
-    make_cover_table,
-    make_direction_table,
-    make_distance_table,
-    make_offset_table,
-)
 from hose_mj.tasks.task import Task, compose_task
 from hose_mj.tasks.variables import Variable
 
@@ -166,18 +158,18 @@ def make_line(settings: LineSettings) -> Task:
 def _make_tables(settings: LineSettings) -> dict[str, Any]:
     """Makes the fields of the record that its geometry is looked up in."""
     largest_square = settings.hose_length**2 // settings.n_robots**2
-    offsets = list_offsets(largest_square)
-    cover_reach = min(math.isqrt(largest_square), LARGEST_REACH)
+    offsets = geometry.list_offsets(largest_square)
+    cover_reach = min(math.isqrt(largest_square), geometry.LARGEST_REACH)
     reach = 2 * settings.half_width
     levels = N_SQUARES if settings.own_goals else N_DISTANCES
     return {
         "largest_square": largest_square,
         "offsets": offsets,
-        "offset_table": make_offset_table(offsets),
+        "offset_table": geometry.make_offset_table(offsets),
         "cover_reach": cover_reach,
-        "cover_table": make_cover_table(cover_reach),
-        "distance_table": make_distance_table(reach, levels, squared=settings.own_goals),
-        "direction_table": make_direction_table(reach),
+        "cover_table": geometry.make_cover_table(cover_reach),
+        "distance_table": geometry.make_distance_table(reach, levels, squared=settings.own_goals),
+        "direction_table": geometry.make_direction_table(reach),
     }
 
 
@@ -205,7 +197,7 @@ def _list_variables(settings: LineSettings, n_offsets: int) -> tuple[Variable, .
         ("p", cells, "robot's cell, numbered as the goal's"),
         ("r_g", (4 * settings.half_width + 1) ** 2, "G - P, numbered alike"),
         ("d_g", levels, f"{distance} to the goal, rounded down, at most {levels - 1}"),
-        ("theta_g", N_DIRECTIONS, "direction of the goal in eighths: 0 right, 2 up"),
+        ("theta_g", geometry.N_DIRECTIONS, "direction of the goal in eighths: 0 right, 2 up"),
         ("r_n", n_offsets, "next robot's place relative to it, P_(i-1) - P_i; (0, 0) at the tip"),
         ("r_p", n_offsets, "its place relative to the previous robot, P_i - P_(i+1)"),
         *((f"o_{name}", 2, f"1 when stepping {name} would collide") for name in DIRECTIONS),

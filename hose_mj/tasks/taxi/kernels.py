@@ -12,6 +12,8 @@ from hose_mj.tasks.stream import Stream
 COLLISION, MISPLACED, GOAL = 1, 2, 4
 UP, RIGHT, DOWN, LEFT, PICK, DROP = range(6)
 WIDTH = 5
+STATIONS = {"R": (0, 0), "G": (0, 4), "Y": (4, 0), "B": (4, 3)}
+"""Cells (row, column), row 0 at the top (Dietterich 2000)."""
 WAITING = 0
 
 

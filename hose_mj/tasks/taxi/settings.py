@@ -13,12 +13,10 @@ from hose_mj.tasks.checks import check_cells, check_choice, check_finite, check_
 from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.task import Task, compose_task
 from hose_mj.tasks.taxi import kernels as rules
+from hose_mj.tasks.taxi.kernels import STATIONS
 from hose_mj.tasks.variables import Variable
 
 Cell = tuple[int, int]
-
-STATIONS: dict[str, Cell] = {"R": (0, 0), "G": (0, 4), "Y": (4, 0), "B": (4, 3)}
-"""Cells (row, column), row 0 at the top (Dietterich 2000)."""
 
 WALLS_RIGHT_OF = ((0, 1), (1, 1), (3, 0), (3, 2), (4, 0), (4, 2))
 """The cells with an inner wall on their right."""

@@ -26,7 +26,7 @@ from hose_learning.learner import Made
 from hose_learning.presets import make_modules
 from hose_learning.records import Memory
 from hose_learning.settings import LearnerSettings
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.plugins import find_plugins, load_plugin
 from hose_mj.tasks.task import Task
 
@@ -187,11 +187,7 @@ def list_learners() -> dict[str, LearnerEntry]:
 
 
 def find_learner(id: str) -> LearnerEntry:
-    """Returns the entry of a learner.
-
-    Raises:
-        InputError: there is none of that id.
-    """
+    """Returns the entry of a learner; `InputError` if there is none of that id."""
     if id in LEARNERS:
         return LEARNERS[id]
     plugins = find_plugins(GROUP, LEARNERS)
@@ -228,22 +224,14 @@ def make_settings(
         settings = {"modules": modules, **settings}
     known = [f.name for f in dataclasses.fields(LearnerSettings)]
     for name in settings:
-        if name not in known:
-            raise InputError("setting", name, "one of " + ", ".join(known))
+        check_choice("setting", name, known)
     return LearnerSettings(**{**entry.settings, **settings})
 
 
 def make(id: str, task: Task, settings: LearnerSettings, generator: Generator) -> Made:
-    """Makes a learner that has learned nothing.
+    """Makes a learner that has learned nothing, from its id; the generator seeds all of its chance.
 
-    Args:
-        id: one of `list_learners`.
-        task: the task it is for.
-        settings: its settings.
-        generator: seeds its choices and the resets.
-
-    Raises:
-        InputError: an unknown id, or settings that the task or the rule does not allow.
+    `InputError` is raised for an unknown id, or settings that the task or the rule does not allow.
     """
     entry = find_learner(id)
     factory = getattr(importlib.import_module(entry.module), entry.factory)

@@ -12,14 +12,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.coordination import (
-    OPTIONS,
-    add_to_edge,
-    choose_on_graph,
-    get_edge_value,
-    make_coordination,
-    maximize_module,
-)
+from hose_learning.learners import coordination
 from hose_learning.learners.joint import sum_team_reward
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.learners.solvers import Graph
@@ -43,13 +36,15 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
         InputError: a wrong option (see `coordination.OPTIONS`), or settings that a sum over edges
             does not allow.
     """
-    graph, scratch = make_coordination(task, settings, get_options(settings, OPTIONS))
+    graph, scratch = coordination.make_coordination(
+        task, settings, get_options(settings, coordination.OPTIONS)
+    )
     rule = Coordinated(float(settings.discount), graph)
     width, n_edges = task.n_actions**2, len(graph.edges)
     return make_learner(task, settings, rule, generator, scratch, width, n_edges)
 
 
-rules.choose_joint.register(Coordinated)(choose_on_graph)
+rules.choose_joint.register(Coordinated)(coordination.choose_on_graph)
 
 
 @rules.learn_joint.register(Coordinated)
@@ -64,12 +59,13 @@ def learn_joint(rule: Coordinated, learner: Learner, memory: Memory, is_over: bo
     for module in range(learner.bases.shape[0]):
         td_target = sum_team_reward(learner, memory, module)
         if not is_over:
-            td_target += rule.discount * maximize_module(graph, learner, memory, module)
+            best = coordination.maximize_module(graph, learner, memory, module)
+            td_target += rule.discount * best
         value = 0.0
         for edge in range(n_edges):
-            value += get_edge_value(graph, learner, memory, edge, module)
+            value += coordination.get_edge_value(graph, learner, memory, edge, module)
         delta = td_target - value
         if delta != 0.0:  # rows of zeros that stay so are not stored
             change = get_learning_rate(learner, memory) * delta
             for edge in range(n_edges):
-                add_to_edge(graph, learner, memory, edge, module, change)
+                coordination.add_to_edge(graph, learner, memory, edge, module, change)

@@ -8,17 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from hose_learning.learners import solvers
 from hose_learning.learners.joint import allow_fallbacks, draw_each
-from hose_learning.learners.solvers import (
-    ELIMINATION,
-    SOLVERS,
-    Graph,
-    Scratch,
-    make_graph,
-    make_scratch,
-    maximize,
-    read_edges,
-)
+from hose_learning.learners.solvers import Graph
 from hose_learning.mediators import GREATEST_MASS, MEDIATORS
 from hose_learning.records import EPSILON, Learner, Memory
 from hose_learning.settings import LearnerSettings, check_range
@@ -41,21 +33,21 @@ one of `solvers.SOLVERS`; starts of coordinate ascent, or most rounds of message
 
 def make_coordination(
     task: Task, settings: LearnerSettings, options: dict[str, Any]
-) -> tuple[Graph, Scratch]:
+) -> tuple[Graph, solvers.Scratch]:
     """Makes the graph of some options (see `OPTIONS`), and its work arrays.
 
     Raises:
         InputError: a wrong option, or settings that a sum over edges does not allow.
     """
     check_settings(task, settings)
-    check_choice("solver", options["solver"], SOLVERS)
+    check_choice("solver", options["solver"], solvers.SOLVERS)
     check_range("rounds", options["rounds"], 1, 10**6)
-    edges = read_edges(options["graph"], task.n_agents)
-    solver = SOLVERS[options["solver"]]
+    edges = solvers.read_edges(options["graph"], task.n_agents)
+    solver = solvers.SOLVERS[options["solver"]]
     n_agents, n_actions = task.n_agents, task.n_actions
-    rounds, eliminates = int(options["rounds"]), solver == ELIMINATION
-    graph = make_graph(n_agents, n_actions, edges, solver, rounds, eliminates)
-    return graph, make_scratch(graph, n_actions)
+    rounds, eliminates = int(options["rounds"]), solver == solvers.ELIMINATION
+    graph = solvers.make_graph(n_agents, n_actions, edges, solver, rounds, eliminates)
+    return graph, solvers.make_scratch(graph, n_actions)
 
 
 def check_settings(task: Task, settings: LearnerSettings) -> None:
@@ -105,7 +97,7 @@ def maximize_module(graph: Graph, learner: Learner, memory: Memory, module: int)
     """Returns max_a' sum_ij Q_ij(s', a'_i, a'_j) of one module; `memory.own.best` is that a'."""
     memory.own.values[:] = 0.0
     add_payoffs(graph, learner, memory, module)
-    return maximize(graph, memory.own, graph.everything, memory.stream)
+    return solvers.maximize(graph, memory.own, graph.everything, memory.stream)
 
 
 @jitable
@@ -134,6 +126,6 @@ def choose_on_graph(rule: Any, task: Any, learner: Learner, memory: Memory, expl
     memory.own.values[:] = 0.0
     for module in range(learner.bases.shape[0]):
         add_payoffs(rule.graph, learner, memory, module)
-    maximize(rule.graph, memory.own, memory.allowed, memory.stream)
+    solvers.maximize(rule.graph, memory.own, memory.allowed, memory.stream)
     for agent in range(memory.actions.shape[0]):
         memory.actions[agent] = memory.own.best[agent]

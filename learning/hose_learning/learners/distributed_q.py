@@ -13,13 +13,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.joint import (
-    choose_each,
-    compute_highest_value,
-    compute_next_value,
-    get_last_value,
-    set_last_value,
-)
+from hose_learning.learners import joint
 from hose_learning.mediators import mediate
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, get_options
@@ -64,7 +58,7 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     return make_learner(task, settings, rule, generator, width=width)
 
 
-rules.choose_joint.register(DistributedQ)(choose_each)
+rules.choose_joint.register(DistributedQ)(joint.choose_each)
 
 
 @rules.score.register(DistributedQ)
@@ -89,11 +83,11 @@ def learn_joint(rule: DistributedQ, learner: Learner, memory: Memory, is_over: b
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            following = compute_next_value(memory, agent, module, is_over)
+            following = joint.compute_next_value(memory, agent, module, is_over)
             td_target = memory.rewards[agent, module] + rule.discount * following
-            if td_target > get_last_value(memory, agent, module, action):
-                highest = compute_highest_value(memory, memory.last_keys[agent, module])
-                set_last_value(memory, agent, module, action, td_target)
+            if td_target > joint.get_last_value(memory, agent, module, action):
+                highest = joint.compute_highest_value(memory, memory.last_keys[agent, module])
+                joint.set_last_value(memory, agent, module, action, td_target)
                 if rule.keeps_policy and td_target > highest:
                     kept = memory.scores.shape[0]
-                    set_last_value(memory, agent, module, kept, action + 1.0)
+                    joint.set_last_value(memory, agent, module, kept, action + 1.0)

@@ -12,13 +12,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.joint import (
-    choose_each,
-    compute_next_value,
-    get_last_value,
-    make_weights,
-    set_last_value,
-)
+from hose_learning.learners import joint
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings
@@ -45,11 +39,11 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     Raises:
         InputError: a wrong option (see `joint.NEIGHBOUR_OPTIONS`).
     """
-    rule = DistributedRewards(float(settings.discount), make_weights(task.n_agents, settings))
+    rule = DistributedRewards(float(settings.discount), joint.make_weights(task.n_agents, settings))
     return make_learner(task, settings, rule, generator)
 
 
-rules.choose_joint.register(DistributedRewards)(choose_each)
+rules.choose_joint.register(DistributedRewards)(joint.choose_each)
 
 
 @rules.learn_joint.register(DistributedRewards)
@@ -63,10 +57,10 @@ def learn_joint(rule: DistributedRewards, learner: Learner, memory: Memory, is_o
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            td_target = rule.discount * compute_next_value(memory, agent, module, is_over)
+            td_target = rule.discount * joint.compute_next_value(memory, agent, module, is_over)
             for other in range(memory.actions.shape[0]):
                 td_target += rule.weights[agent, other] * memory.rewards[other, module]
-            value = get_last_value(memory, agent, module, action)
+            value = joint.get_last_value(memory, agent, module, action)
             if td_target != value:  # a row of zeros that stays so is not stored
                 value += alpha * (td_target - value)
-                set_last_value(memory, agent, module, action, value)
+                joint.set_last_value(memory, agent, module, action, value)

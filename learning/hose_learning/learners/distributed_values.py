@@ -12,13 +12,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.joint import (
-    choose_each,
-    compute_next_value,
-    get_last_value,
-    make_weights,
-    set_last_value,
-)
+from hose_learning.learners import joint
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings
@@ -45,11 +39,11 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     Raises:
         InputError: a wrong option.
     """
-    rule = DistributedValues(float(settings.discount), make_weights(task.n_agents, settings))
+    rule = DistributedValues(float(settings.discount), joint.make_weights(task.n_agents, settings))
     return make_learner(task, settings, rule, generator)
 
 
-rules.choose_joint.register(DistributedValues)(choose_each)
+rules.choose_joint.register(DistributedValues)(joint.choose_each)
 
 
 @rules.learn_joint.register(DistributedValues)
@@ -64,15 +58,15 @@ def learn_joint(rule: DistributedValues, learner: Learner, memory: Memory, is_ov
     for agent in range(n_agents):
         for module in range(learner.bases.shape[0]):
             for other in range(n_agents):
-                following = compute_next_value(memory, other, module, is_over)
+                following = joint.compute_next_value(memory, other, module, is_over)
                 discount = rule.discount * rule.weights[agent, other]
                 td_targets[agent, module] += discount * following
     alpha = get_learning_rate(learner, memory)
     for agent in range(n_agents):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            value = get_last_value(memory, agent, module, action)
+            value = joint.get_last_value(memory, agent, module, action)
             td_target = td_targets[agent, module]
             if td_target != value:  # a row of zeros that stays so is not stored
                 value += alpha * (td_target - value)
-                set_last_value(memory, agent, module, action, value)
+                joint.set_last_value(memory, agent, module, action, value)

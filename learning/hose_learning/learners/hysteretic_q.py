@@ -12,12 +12,7 @@ from numpy.random import Generator
 
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
-from hose_learning.learners.joint import (
-    choose_each,
-    compute_next_value,
-    get_last_value,
-    set_last_value,
-)
+from hose_learning.learners import joint
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.records import Learner, Memory
 from hose_learning.settings import LearnerSettings, check_range, get_options
@@ -47,7 +42,7 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     return make_learner(task, settings, rule, generator)
 
 
-rules.choose_joint.register(Hysteretic)(choose_each)
+rules.choose_joint.register(Hysteretic)(joint.choose_each)
 
 
 @rules.learn_joint.register(Hysteretic)
@@ -62,10 +57,10 @@ def learn_joint(rule: Hysteretic, learner: Learner, memory: Memory, is_over: boo
     for agent in range(memory.actions.shape[0]):
         action = memory.actions[agent]
         for module in range(learner.bases.shape[0]):
-            following = compute_next_value(memory, agent, module, is_over)
+            following = joint.compute_next_value(memory, agent, module, is_over)
             td_target = memory.rewards[agent, module] + rule.discount * following
-            value = get_last_value(memory, agent, module, action)
+            value = joint.get_last_value(memory, agent, module, action)
             delta = td_target - value
             rate = alpha if delta > 0.0 else rule.beta_ratio * alpha
             if rate * delta != 0.0:  # a row of zeros that stays so is not stored
-                set_last_value(memory, agent, module, action, value + rate * delta)
+                joint.set_last_value(memory, agent, module, action, value + rate * delta)

@@ -76,18 +76,10 @@ def make_graph(
     rounds: int,
     eliminates: bool,
 ) -> Graph:
-    """Makes a graph.
+    """Makes a graph of edges, pairs of agents with the lower number first; see `Graph`.
 
-    Args:
-        n_agents: number of agents.
-        n_actions: number of actions of each.
-        edges: pairs of agents, the lower number first.
-        solver: one of the numbers in `solvers.SOLVERS`.
-        rounds: see `Graph`.
-        eliminates: whether the solver needs the functions that elimination leaves.
-
-    Raises:
-        InputError: elimination of a graph with so many edges that these functions grow too large.
+    `eliminates` says whether the solver needs the functions that elimination leaves; `InputError`
+    is raised where so many edges make these too large.
     """
     order, left = order_elimination(n_agents, edges)
     scopes = [*edges, *(left if eliminates else [])]
@@ -208,11 +200,8 @@ def make_scratch(graph: Graph, n_actions: int) -> Scratch:
 def maximize(graph: Graph, scratch: Scratch, allowed: Integers, stream: Stream) -> float:
     """Writes the best joint action found into `scratch.best` and returns its payoff.
 
-    Args:
-        graph: the graph.
-        scratch: payoffs and work arrays.
-        allowed: what each agent may do, as bits (n_agents,), none of them 0.
-        stream: random numbers for ties and starts.
+    `allowed` is what each agent may do, as bits (n_agents,), none of them 0. The stream decides
+    ties and starts.
     """
     if graph.solver == ELIMINATION:
         eliminate(graph, scratch, allowed, stream)

@@ -13,13 +13,6 @@ from numpy.random import Generator
 from hose_learning import rules
 from hose_learning.learner import Made, make_learner
 from hose_learning.learners import coordination
-from hose_learning.learners.coordination import (
-    add_to_edge,
-    choose_on_graph,
-    get_edge_value,
-    make_coordination,
-    maximize_module,
-)
 from hose_learning.learners.joint import get_own_reward
 from hose_learning.learners.round_robin import get_learning_rate
 from hose_learning.learners.solvers import Graph, compute_place
@@ -35,13 +28,7 @@ OPTIONS = {**coordination.OPTIONS, "update": "edge"}
 
 
 class Sparse(NamedTuple):
-    """The rule's constants.
-
-    Attributes:
-        discount: gamma.
-        graph: the coordination graph.
-        updates_by_agent: see `OPTIONS`.
-    """
+    """The rule's constants: gamma, the coordination graph, and what `OPTIONS` says of updates."""
 
     discount: float
     graph: Graph
@@ -57,13 +44,13 @@ def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:
     """
     options = get_options(settings, OPTIONS)
     check_choice("update", options["update"], ("edge", "agent"))
-    graph, scratch = make_coordination(task, settings, options)
+    graph, scratch = coordination.make_coordination(task, settings, options)
     rule = Sparse(float(settings.discount), graph, options["update"] == "agent")
     width, n_edges = task.n_actions**2, len(graph.edges)
     return make_learner(task, settings, rule, generator, scratch, width, n_edges)
 
 
-rules.choose_joint.register(Sparse)(choose_on_graph)
+rules.choose_joint.register(Sparse)(coordination.choose_on_graph)
 
 
 @rules.learn_joint.register(Sparse)
@@ -72,7 +59,7 @@ def learn_joint(rule: Sparse, learner: Learner, memory: Memory, is_over: bool) -
     """Learns from the joint action a* that is best for the whole graph in the new state."""
     for module in range(learner.bases.shape[0]):
         if not is_over:
-            maximize_module(rule.graph, learner, memory, module)
+            coordination.maximize_module(rule.graph, learner, memory, module)
         if rule.updates_by_agent:
             update_by_agent(rule, learner, memory, module, is_over)
         else:
@@ -103,9 +90,9 @@ def update_by_edge(
             agent = graph.edges[edge, side]
             reward = get_own_reward(learner, memory, agent, module)
             td_target += reward / graph.degrees[agent]
-        delta = td_target - get_edge_value(graph, learner, memory, edge, module)
+        delta = td_target - coordination.get_edge_value(graph, learner, memory, edge, module)
         if delta != 0.0:  # a row of zeros that stays so is not stored
-            add_to_edge(graph, learner, memory, edge, module, alpha * delta)
+            coordination.add_to_edge(graph, learner, memory, edge, module, alpha * delta)
 
 
 @jitable
@@ -122,7 +109,7 @@ def update_by_agent(
         errors[agent] = get_own_reward(learner, memory, agent, module)
     for edge in range(graph.edges.shape[0]):
         gain = get_next_value(rule, memory, edge, is_over)
-        gain -= get_edge_value(graph, learner, memory, edge, module)
+        gain -= coordination.get_edge_value(graph, learner, memory, edge, module)
         for side in range(2):
             errors[graph.edges[edge, side]] += 0.5 * gain
     for edge in range(graph.edges.shape[0]):
@@ -131,4 +118,4 @@ def update_by_agent(
             agent = graph.edges[edge, side]
             delta += errors[agent] / graph.degrees[agent]
         if delta != 0.0:  # a row of zeros that stays so is not stored
-            add_to_edge(graph, learner, memory, edge, module, alpha * delta)
+            coordination.add_to_edge(graph, learner, memory, edge, module, alpha * delta)

@@ -104,11 +104,8 @@ class UndesiredPredictor:
     def remember(self, values: Integers, agent: int, action: int, undesired: bool) -> None:
         """Keeps an instance <s_t, a_t, omega(r_t)>, and fits anew when it is time.
 
-        Args:
-            values: what the agent saw before its move (n_variables,).
-            agent: who moved.
-            action: its action.
-            undesired: whether the move broke a constraint.
+        `values` (n_variables,) are what the agent saw before the move that broke a constraint or
+        not.
         """
         label = UNDESIRED if undesired else SAFE
         add_instance(self.buffer, values, agent, action, label, self.stream)
@@ -223,13 +220,8 @@ def add_instance(
 ) -> None:
     """Keeps an instance; where its action and class are full it replaces a random one of them.
 
-    Args:
-        buffer: changed in place.
-        values: what the agent saw before its move (n_variables,).
-        agent: who moved.
-        action: its action.
-        undesired: UNDESIRED if the move broke a constraint, SAFE if not.
-        stream: random numbers.
+    `values` (n_variables,) are what the agent saw before its move, `undesired` is UNDESIRED if that
+    broke a constraint and SAFE if not. The buffer is changed in place.
     """
     place = buffer.counts[agent, action, undesired]
     if place < buffer.values.shape[3]:

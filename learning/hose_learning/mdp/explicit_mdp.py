@@ -86,14 +86,7 @@ def write_out(task: Task, starts: Iterable[Integers], limit: int = 10**5) -> Wri
     """Writes a task out with all that agents moving in turn, or a single one, can reach.
 
     The reward of a state is what the mover feels, all signals added up: what the events are worth.
-
-    Args:
-        task: the task.
-        starts: initial states; no event led there.
-        limit: largest number of states.
-
-    Raises:
-        InputError: more states than the limit.
+    No event led to `starts`. `InputError` is raised for more states than the limit.
     """
     states: list[Integers] = []
     events: list[int] = []
@@ -179,14 +172,8 @@ def evaluate(
 ) -> Floats:
     """Returns V of a deterministic policy (n_states,); 0 in terminal states.
 
-    Args:
-        model: the process.
-        policy: an action for each state (n_states,).
-        discount: gamma.
-        tolerance: largest change of a value in the last sweep.
-
-    Raises:
-        InputError: a discount outside [0, 1).
+    `policy` has an action for each state (n_states,); no value changes by more than `tolerance` in
+    the last sweep. `InputError` is raised for a discount outside [0, 1).
     """
     _check_discount(discount)
     chosen = model.transitions[np.arange(model.n_states) * model.n_actions + policy]

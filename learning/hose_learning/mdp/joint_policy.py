@@ -70,12 +70,10 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Composition:
-    """A joint move that agents agreed on.
+    """A joint move that agents agreed on: an action for each, in the order of their turns.
 
-    Attributes:
-        actions: one for each agent, in the order of their turns.
-        messages: what each agent got, and at last what the cycle leads to.
-        value: what eqs 6.5 and 6.6 expect of it, rewards that are not positive left out.
+    `messages` are what each agent got, and at last what the cycle leads to; `value` is what eqs 6.5
+    and 6.6 expect of it, rewards that are not positive left out.
     """
 
     actions: tuple[int, ...]
@@ -90,14 +88,10 @@ def compose(
     discount: float,
     idle: int,
 ) -> Composition:
-    """Lets the agents agree on a joint move, one after the other.
+    """Lets the agents agree on a joint move from s_0, agent 0's turn, one after the other.
 
-    Args:
-        start: s_0, agent 0's turn.
-        estimates: of each agent.
-        evaluate: their Q-values; they are asked only about states that they know.
-        discount: gamma.
-        idle: the action of an agent that expects nothing but terminal states.
+    `evaluate` is asked only about states that its agent knows; `idle` is the action of an agent
+    that expects nothing but terminal states.
     """
     messages: list[Message] = [{start: 1.0}]
     actions = []
@@ -157,11 +151,8 @@ def estimate(
 ) -> list[Estimates]:
     """Plays in turns, each agent any action that it may take, and lets each note its own moves.
 
-    Args:
-        task: the task.
-        evaluate: its keys are the actions that an agent may take; none at all leaves it idle.
-        n_moves: moves of single agents.
-        generator: of the actions and resets.
+    The keys of `evaluate` are the actions that an agent may take; none at all leaves it idle.
+    `n_moves` are moves of single agents; the generator decides actions and resets.
     """
     estimates = [Estimates() for _ in task.agents]
     stream = make_stream(generator)
@@ -183,13 +174,7 @@ def estimate(
 
 @dataclass(frozen=True)
 class JointMove:
-    """One joint move of a composed policy.
-
-    Attributes:
-        composition: what was agreed on.
-        state: the state after it.
-        events: what it caused.
-    """
+    """One joint move of a composed policy, the state after it and the events that it caused."""
 
     composition: Composition
     state: Integers
@@ -204,16 +189,7 @@ def play_composed(
     discount: float,
     max_moves: int,
 ) -> list[JointMove]:
-    """Plays composed joint moves until the episode is over.
-
-    Args:
-        task: the task.
-        start: the initial state.
-        estimates: of each agent, as for `compose`.
-        evaluate: their Q-values.
-        discount: gamma.
-        max_moves: joint moves after which it is given up.
-    """
+    """Plays joint moves that `compose` makes until the episode is over, at most `max_moves`."""
     state, idle = start.copy(), find_idle(task)
     charged = np.zeros(task.n_agents, np.int64)
     moves: list[JointMove] = []
@@ -230,9 +206,8 @@ def play_composed(
 def count_fewest_moves(model: Model, success: int) -> int | None:
     """Returns how many moves at least lead from the first state to a success; None if none do.
 
-    Args:
-        model: a task written out, as by `exact.enumerate_joint`.
-        success: the events that mean success.
+    The model is a task written out, as by `exact.enumerate_joint`; `success` are the events that
+    mean it.
     """
     reached, frontier = {0}, [0]
     moves = 0

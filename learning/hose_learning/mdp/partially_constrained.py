@@ -9,14 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from scipy.sparse import csr_array
 
-from hose_learning.mdp.explicit_mdp import (
-    MarkovModel,
-    WrittenTask,
-    compute_safe_actions,
-    evaluate,
-    solve,
-    write_out,
-)
+from hose_learning.mdp import explicit_mdp
+from hose_learning.mdp.explicit_mdp import MarkovModel, WrittenTask
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import TURN, Floats, Integers
 from hose_mj.tasks.registry import make_task
@@ -212,23 +206,18 @@ class Propositions:
 def compute_propositions(
     source: MarkovModel, target: MarkovModel, projection: Integers, discount: float = 0.9
 ) -> Propositions:
-    """Measures Propositions 4 and 5 on a pair of tasks.
-
-    Args:
-        source: the source task.
-        target: the target task.
-        projection: [s] of each target state, none of them `ABSENT`.
-        discount: gamma.
-    """
-    safe = compute_safe_actions(target)
-    unsafe_in_source = safe & ~compute_safe_actions(source)[projection]
-    transferred = solve(source, discount)[projection]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
+    """Measures Propositions 4 and 5 on a pair of tasks; `projection` has no `ABSENT` state."""
+    safe = explicit_mdp.compute_safe_actions(target)
+    unsafe_in_source = safe & ~explicit_mdp.compute_safe_actions(source)[projection]
+    transferred = explicit_mdp.solve(source, discount)[
+        projection
+    ]  # Q_t(s, a) = Q_s*([s], a), equation 7.1
     return Propositions(
         unsafe_in_source=int(unsafe_in_source.sum()),
         # Nothing follows on a terminal state of the target, whatever does in the source.
         bounds=np.where(target.terminal, 0.0, transferred.max(axis=1)),
-        best=solve(target, discount).max(axis=1),
-        greedy=evaluate(target, choose_greedy(transferred, safe), discount),
+        best=explicit_mdp.solve(target, discount).max(axis=1),
+        greedy=explicit_mdp.evaluate(target, choose_greedy(transferred, safe), discount),
     )
 
 
@@ -240,16 +229,9 @@ def choose_greedy(q_values: Floats, allowed: np.ndarray) -> Integers:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two tasks and what Definition 11 says about them.
+    """Two tasks by their ids and options, and the properties of Definition 11 that do not hold.
 
-    Attributes:
-        meaning: in a line.
-        source: id of the source task.
-        target: id of the target task.
-        settings: options of both.
-        source_settings: options of the source alone.
-        target_settings: options of the target alone.
-        violated: the properties that do not hold.
+    `settings` are options of both tasks; `meaning` is a line about the pair.
     """
 
     meaning: str
@@ -318,14 +300,8 @@ def write_pair(
 ) -> WrittenPair:
     """Writes two tasks out from one start, drawn for the target.
 
-    Args:
-        source: a task with the parts of the target's state, or fewer or shorter ones.
-        target: a task with the same agents and actions.
-        random: draws the start.
-        limit: largest number of states of a task.
-
-    Raises:
-        InputError: agents, actions or parts that differ, or more states than the limit.
+    The source has the same agents and actions and the parts of the target's state, or fewer or
+    shorter ones; `InputError` is raised if not, or for more states of a task than the limit.
     """
     for name, given, valid in (
         ("agents of the target", target.agents, source.agents),
@@ -338,8 +314,8 @@ def write_pair(
         if _measure(place) > sizes.get(name, 0):
             raise InputError(f"size of {name!r} in the source", _measure(place), "the target's")
     start = target.reset(make_stream(random))
-    written_source = write_out(source, [project_state(source, target, start)], limit)
-    written_target = write_out(target, [start], limit)
+    written_source = explicit_mdp.write_out(source, [project_state(source, target, start)], limit)
+    written_target = explicit_mdp.write_out(target, [start], limit)
     return WrittenPair(
         written_source,
         written_target,

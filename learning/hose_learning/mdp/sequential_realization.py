@@ -6,14 +6,15 @@ agent but the i-th is idle, does what agent i's action a_i does alone (Definitio
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from hose_learning.mdp.explicit_mdp import describe_state
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks import kernels
 from hose_mj.tasks.exact import enumerate_joint, enumerate_turns
 from hose_mj.tasks.kernels import HEADER, TURN, Floats, Integers
@@ -31,16 +32,11 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class SequentialViolation:
-    """A property of Definition 10 that does not hold.
+    """A property of Definition 10, a key of `PROPERTIES`, that does not hold.
 
-    Attributes:
-        number: a key of `PROPERTIES`.
-        count: states, agents and actions for which it does not.
-        state: the first such state, in words.
-        agent: name of the agent that acts.
-        action: name of its action.
-        alone: what comes of the action alone.
-        jointly: what comes of the joint action in which it alone is not idle.
+    `count` is the number of states, agents and actions for which it does not; `state` (in words),
+    `agent` and `action` (names) are the first of them. `alone` is what comes of the action alone,
+    `jointly` what comes of the joint action in which it alone is not idle.
     """
 
     number: int
@@ -67,12 +63,9 @@ class MoveOutcome:
 
 @dataclass(frozen=True)
 class SequentialStudy:
-    """What was compared.
+    """What was compared, whosever turn it is, and the properties that do not hold.
 
-    Attributes:
-        n_states: states, whosever turn it is.
-        n_moves: states times agents times actions.
-        violations: the properties that do not hold.
+    `n_moves` is the number of states times agents times actions.
     """
 
     n_states: int
@@ -105,23 +98,22 @@ def study_sequential(
     """
     if task.schedule != "turns":
         raise InputError("task", task.id, "one whose agents move in turn")
-    if idle not in task.action_names:
-        raise InputError("idle action", idle, "one of " + ", ".join(task.action_names))
+    check_choice("idle action", idle, task.action_names)
     states = _list_states(task, list(starts), limit)
     nothing = task.action_names.index(idle)
-    found: dict[int, list[tuple[Integers, int, int]]] = {number: [] for number in PROPERTIES}
+    counts: Counter[int] = Counter()
+    first: dict[int, SequentialViolation] = {}
     for state in states:
         for agent in range(task.n_agents):
             for action in range(task.n_actions):
                 alone = move_alone(task, state, agent, action, sharing)
                 jointly = move_jointly(task, state, agent, action, nothing, sharing)
                 for number in compare(alone, jointly):
-                    found[number].append((state, agent, action))
-    violations = tuple(
-        _make_violation(task, number, moves, nothing, sharing)
-        for number, moves in found.items()
-        if moves
-    )
+                    counts[number] += 1
+                    if number not in first:
+                        made = _make_violation(task, number, state, agent, action, alone, jointly)
+                        first[number] = made
+    violations = tuple(replace(first[n], count=counts[n]) for n in PROPERTIES if n in first)
     return SequentialStudy(len(states), len(states) * task.n_agents * task.n_actions, violations)
 
 
@@ -190,26 +182,13 @@ def compare(alone: MoveOutcome, jointly: MoveOutcome) -> list[int]:
 
 
 def _make_violation(
-    task: Task,
-    number: int,
-    moves: list[tuple[Integers, int, int]],
-    idle: int,
-    sharing: Sharing,
+    task: Task, number: int, state: Integers, agent: int, action: int, *outcomes: MoveOutcome
 ) -> SequentialViolation:
-    state, agent, action = moves[0]
-    alone = move_alone(task, state, agent, action, sharing)
-    jointly = move_jointly(task, state, agent, action, idle, sharing)
     shown = state.copy()
     shown[TURN] = agent
-    return SequentialViolation(
-        number,
-        len(moves),
-        describe_state(task, shown),
-        task.agents[agent],
-        task.action_names[action],
-        _describe(task, alone),
-        _describe(task, jointly),
-    )
+    names = task.agents[agent], task.action_names[action]
+    texts = (_describe(task, outcome) for outcome in outcomes)
+    return SequentialViolation(number, 1, describe_state(task, shown), *names, *texts)
 
 
 def _describe(task: Task, outcome: MoveOutcome) -> str:

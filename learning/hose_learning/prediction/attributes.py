@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from hose_learning.experience import Experience
-from hose_mj.errors import InputError
+from hose_mj.errors import check_choice
 from hose_mj.tasks.kernels import Floats, Integers
 
 GRID_VARIABLES = {
@@ -46,8 +46,7 @@ class Encoding:
             "action": ("integer", "one-hot"),
             "cells": ("coordinates", "number"),
         }.items():
-            if getattr(self, name) not in choices:
-                raise InputError(name, getattr(self, name), "one of " + ", ".join(choices))
+            check_choice(name, getattr(self, name), choices)
 
 
 def make_attributes(experience: Experience, encoding: Encoding) -> tuple[Floats, tuple[str, ...]]:

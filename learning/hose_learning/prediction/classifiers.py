@@ -19,7 +19,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 from hose_learning.experience import Bools
 from hose_learning.prediction.cross_validation import Classifier
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.tasks.kernels import Floats, Integers
 
 ClusterRule = Literal["matched", "majority"]
@@ -28,13 +28,9 @@ ClusterRule = Literal["matched", "majority"]
 class ClusterClassifier:
     """Clusters found without the classes, which then name the clusters.
 
-    Args:
-        clusterer: has `fit` and `predict`.
-        rule: "matched" gives each of two clusters a class of its own, in the way with fewer errors
-            on the training set; "majority" gives any cluster the class of most of its instances.
-
-    Raises:
-        InputError: another rule, or more than two clusters to be matched.
+    The rule "matched" gives each of two clusters a class of its own, in the way with fewer errors
+    on the training set; "majority" gives any cluster the class of most of its instances.
+    `InputError` is raised for another rule, or more than two clusters to be matched.
     """
 
     def __init__(self, clusterer: Any, rule: ClusterRule) -> None:
@@ -152,14 +148,7 @@ Family = Literal["neighbours", "Bayes", "tree", "clusters", "support vectors", "
 
 @dataclass(frozen=True)
 class Setup:
-    """What a classifier is made for.
-
-    Attributes:
-        n_attributes: number of attributes.
-        undesired_share: share of the undesired instances among all.
-        cluster_rule: how clusters become classes, see `ClusterClassifier`.
-        seed: of its random choices.
-    """
+    """What a classifier is made for; `cluster_rule` is that of `ClusterClassifier`."""
 
     n_attributes: int
     undesired_share: float
@@ -174,14 +163,9 @@ class Setup:
 
 @dataclass(frozen=True)
 class ClassifierEntry:
-    """A classifier.
+    """A classifier: its name in the thesis's tables, what runs here, its family and how it is made.
 
-    Attributes:
-        name: as the thesis's tables have it.
-        runs: what runs here; `stands_in` says whether that is another algorithm.
-        family: what it has in common with others.
-        make: makes one that has learned nothing.
-        stands_in: whether scikit-learn lacks the thesis's algorithm.
+    `stands_in` says whether scikit-learn lacks the thesis's algorithm, so that another one runs.
     """
 
     name: str
@@ -276,11 +260,6 @@ CLASSIFIERS: dict[str, ClassifierEntry] = {
 
 
 def make_classifier(id: str, setup: Setup) -> Classifier:
-    """Makes a classifier that has learned nothing.
-
-    Raises:
-        InputError: an unknown id.
-    """
-    if id not in CLASSIFIERS:
-        raise InputError("classifier", id, "one of " + ", ".join(CLASSIFIERS))
+    """Makes a classifier that has learned nothing; `InputError` for an unknown id."""
+    check_choice("classifier", id, CLASSIFIERS)
     return CLASSIFIERS[id].make(setup)

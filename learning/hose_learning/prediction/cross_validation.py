@@ -21,14 +21,7 @@ MEASURES = ("accuracy", "sensitivity", "specificity", "npv", "ppv")
 
 
 class Confusion(NamedTuple):
-    """How many instances of each class were taken for which.
-
-    Attributes:
-        true_positives: safe and taken for safe.
-        true_negatives: undesired and taken for undesired.
-        false_positives: undesired and taken for safe.
-        false_negatives: safe and taken for undesired.
-    """
+    """How many instances of each class were taken for which; safe is positive."""
 
     true_positives: int
     true_negatives: int
@@ -53,15 +46,7 @@ class Confusion(NamedTuple):
 
 
 def count_confusion(undesired: Bools, predicted: Bools) -> Confusion:
-    """Counts what was taken for what.
-
-    Args:
-        undesired: the truth (n,).
-        predicted: what was taken for undesired (n,).
-
-    Raises:
-        InputError: different lengths.
-    """
+    """Counts what of the truth (n,) was predicted as what (n,); `InputError` for other lengths."""
     if undesired.shape != predicted.shape:
         valid = f"as long as the truth, {undesired.shape}"
         raise InputError("shape of the predictions", predicted.shape, valid)
@@ -151,17 +136,10 @@ def cross_validate(
     splits: Sequence[Split],
     on_fold: Callable[[], object] = lambda: None,
 ) -> dict[str, Score]:
-    """Learns and tests on every split.
+    """Learns and tests on every split of `make_splits`; returns the scores by `MEASURES`.
 
-    Args:
-        make: makes the classifier anew for every split.
-        attributes: of all instances (n, n_attributes).
-        undesired: their classes (n,).
-        splits: made by `make_splits`.
-        on_fold: called after each of them.
-
-    Returns:
-        The scores by the names of `MEASURES`.
+    The classifier is made anew for every split; attributes are (n, n_attributes), their classes
+    (n,). `on_fold` is called after each split.
     """
     measured = []
     # One thread: for so few instances more of them only wait for each other, and the order of sums,
@@ -179,11 +157,9 @@ def cross_validate(
 
 
 def compute_score(values: Floats, ratio: float) -> Score:
-    """Returns the score of a measure.
+    """Returns the score of a measure from its values (n_folds,), NaN where it does not exist.
 
-    Args:
-        values: in each fold (n_folds,), NaN where it does not exist.
-        ratio: instances in a test set over those in a training set.
+    `ratio` is the number of instances in a test set over that in a training set.
     """
     values = values[np.isfinite(values)]
     n = len(values)

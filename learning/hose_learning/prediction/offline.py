@@ -13,16 +13,9 @@ import numpy as np
 from scipy.stats import t as student
 
 from hose_learning.experience import Experience, record_experience
+from hose_learning.prediction import cross_validation
 from hose_learning.prediction.attributes import Encoding, make_attributes
 from hose_learning.prediction.classifiers import CLASSIFIERS, ClusterRule, Setup, make_classifier
-from hose_learning.prediction.cross_validation import (
-    MEASURES,
-    MakeClassifier,
-    Score,
-    compute_score,
-    cross_validate,
-    make_splits,
-)
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats
@@ -50,13 +43,10 @@ class Published:
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """A table of the thesis.
+    """A table of the thesis, such as 8.2: what was classified, in words, and its rows.
 
-    Attributes:
-        number: such as "8.2".
-        data: what was classified, in words.
-        cycles: length of the log, in moves of each agent.
-        agents: for each agent, the rows by id of the classifier.
+    `cycles` is the length of the log, in moves of each agent; `agents` has for each agent the rows
+    by id of the classifier.
     """
 
     number: str
@@ -88,7 +78,7 @@ def _make_row(per_cent: dict[str, float]) -> Published:
     return Published(measures, not is_between)
 
 
-Scores = dict[str, Score]
+Scores = dict[str, cross_validation.Score]
 """By the names of `MEASURES`."""
 
 LIFTED = 10**9
@@ -136,14 +126,10 @@ class OfflinePlan:
 
 @dataclass(frozen=True)
 class Result:
-    """One classifier on one agent's moves.
+    """One classifier on one agent's moves: its scores on the first log, by `MEASURES`.
 
-    Attributes:
-        agent: name of the agent.
-        classifier: id.
-        scores: on the first log, by the names of `MEASURES`.
-        over_logs: the mean of each measure on every log (n_logs,), the first one's first.
-        published: the row of the thesis's table; None without one.
+    `over_logs` has the mean of each measure on every log (n_logs,), the first one's first;
+    `published` is the row of the thesis's table, None without one.
     """
 
     agent: str
@@ -166,12 +152,8 @@ class Study:
 def run_study(plan: OfflinePlan, on_fold: Callable[[], object] = lambda: None) -> Study:
     """Logs random moves, the step limit lifted, and cross-validates all classifiers on them.
 
-    Args:
-        plan: what is to be measured.
-        on_fold: called after each fold of each classifier.
-
-    Raises:
-        InputError: a task that does not exist, or too few undesired moves for the folds.
+    `on_fold` is called after each fold of each classifier. `InputError` is raised for a task that
+    does not exist, or too few undesired moves for the folds.
     """
     task = make_task(plan.task, step_limit=LIFTED)
     experiences, logs = [], []
@@ -200,15 +182,17 @@ def score_log(
         own = experience.select(agent)
         attributes, _ = make_attributes(own, plan.encoding)
         undesired = own.undesired
-        splits = make_splits(undesired, plan.repeats, plan.folds, generator)
+        splits = cross_validation.make_splits(undesired, plan.repeats, plan.folds, generator)
         setup = Setup(attributes.shape[1], float(undesired.mean()), plan.cluster_rule, 0)
         for id in CLASSIFIERS:
             make = _make_maker(id, setup)
-            scored[agent, id] = cross_validate(make, attributes, undesired, splits, on_fold)
+            scored[agent, id] = cross_validation.cross_validate(
+                make, attributes, undesired, splits, on_fold
+            )
     return scored
 
 
-def _make_maker(id: str, setup: Setup) -> MakeClassifier:
+def _make_maker(id: str, setup: Setup) -> cross_validation.MakeClassifier:
     return lambda seed: make_classifier(id, replace(setup, seed=seed))
 
 
@@ -227,9 +211,9 @@ def list_records(study: Study) -> list[dict[str, Any]]:
     records = []
     for result in study.results:
         published = result.published
-        for name in MEASURES:
+        for name in cross_validation.MEASURES:
             score = result.scores[name]
-            over_logs = compute_score(result.over_logs[name], 0.0)
+            over_logs = cross_validation.compute_score(result.over_logs[name], 0.0)
             records.append(
                 {
                     "agent": result.agent,

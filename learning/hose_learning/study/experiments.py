@@ -20,16 +20,10 @@ Runs = Mapping[str, list[Result]]
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of one claim.
+    """What was found of one claim, beside what the thesis says, in words or numbers.
 
-    Attributes:
-        claim: what was looked at.
-        thesis: what the thesis says, in words or numbers.
-        ours: what we measured.
-        interval: 95 % of it.
-        n_seeds: how many seeds stand behind it.
-        check: the limit it is held to, if any.
-        unit: of `ours`.
+    `ours` is what we measured, in a unit, with the 95 % interval of it, from so many seeds; `check`
+    is the limit it is held to, if any.
     """
 
     claim: str
@@ -43,13 +37,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment.
+    """An experiment, and how the thesis was read where it leaves something open.
 
-    Attributes:
-        title: one line about it.
-        reading: how the thesis was read where it leaves something open.
-        list_jobs: makes the jobs of a list of seeds.
-        conclude: makes the findings from the results of all jobs, by their names.
+    `list_jobs` makes the jobs of a list of seeds, `conclude` the findings from all results by the
+    jobs' names.
     """
 
     title: str

@@ -56,12 +56,8 @@ def measure(
 ) -> Measures:
     """Trains, tests the greedy policy after every so many episodes, and measures.
 
-    Args:
-        training: from its first move on.
-        max_steps: training steps: moves in turns, or joint moves.
-        max_episodes: most episodes; no bound by default.
-        test_every: episodes between two tests.
-        manner: how the agents move in a test; jointly by default.
+    The training begins with its first move; a step is a move in turns, or a joint move.
+    `max_episodes` is no bound by default, and the agents' manner in a test is joint.
     """
     task = training.task
     joint = training.entry.schedule == "joint"
@@ -170,11 +166,8 @@ def do_all(
 ) -> list[Result]:
     """Does jobs in several processes and returns their results in the order of the jobs.
 
-    Args:
-        jobs: the jobs.
-        n_workers: number of processes; 1 works in this one.
-        folder: results are kept here, one file each, and found again; None keeps nothing.
-        done: called with 1 for each job that is done.
+    With one worker this process does them. Results are kept in `folder`, one file each, and found
+    again; None keeps nothing. `done` is called with 1 for each job that is done.
     """
     results: dict[str, Result] = {}
     for job in jobs:

@@ -154,15 +154,10 @@ def read_manifest(folder: Path) -> dict[str, list[str]]:
 
 
 def load_memory(path: Path, like: Memory) -> Memory:
-    """Reads a memory.
+    """Reads a memory; `like` fits the same learner, only the sizes of hashed tables may differ.
 
-    Args:
-        path: the npz.
-        like: a memory that fits the same learner; only the sizes of hashed tables may differ.
-
-    Raises:
-        InputError: a file that is missing, damaged, changed since it was written, or of another
-            learner.
+    `InputError` is raised for a file that is missing, damaged, changed since it was written, or of
+    another learner.
     """
     path = Path(path)
     if not path.is_file():
@@ -286,11 +281,7 @@ class RunFolder:
         self._write(SUMMARY, summary)
 
     def read(self, name: str) -> dict[str, Any]:
-        """Reads one of the JSON files.
-
-        Raises:
-            InputError: it is missing or no JSON object.
-        """
+        """Reads one of the JSON files; `InputError` where it is missing or no JSON object."""
         path = self.path / name
         try:
             content = json.loads(path.read_bytes())

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hose_learning import evaluation, loop
 from hose_learning.learners import catalog
-from hose_learning.records import EPISODES, EPSILON, MOVES, Log, Memory, make_log
+from hose_learning.records import EPISODES, EPSILON, MOVES, Memory, make_log
 from hose_learning.settings import LearnerSettings
 from hose_learning.tables import count_free, grow
 from hose_mj.errors import InputError
@@ -26,12 +26,9 @@ Manner = Literal["turns", "joint", "composed"]
 
 @dataclass(frozen=True)
 class Episodes:
-    """Episodes as columns, one row each.
+    """Episodes as columns (n,): moves of single agents, last events, sums of all rewards.
 
-    Attributes:
-        moves: of single agents (n,).
-        events: those of the last move (n,).
-        returns: sums of all rewards (n,); NaN in a test.
+    The sums are NaN in a test.
     """
 
     moves: Integers
@@ -148,7 +145,10 @@ class Training:
         kernel = loop.run_joint if self.entry.schedule == "joint" else loop.run_turns
         run = kernel if self._compiled else kernel.py_func
         run(self.task.kernel, self.learner, self.memory, self._log, max_moves, max_episodes)
-        ended = _take(self._log)
+        log, n = self._log, int(self._log.used[0])
+        moves, events = log.episodes[:n].T.copy()
+        ended = Episodes(moves, events, log.returns[:n].copy())
+        log.used[0] = 0
         self._make_room()
         if self.entry.refresh_moves and self.moves % self.entry.refresh_moves == 0:
             catalog.refresh(self.learner_id, self.task, self.settings, self.memory)
@@ -198,10 +198,3 @@ class Training:
     def restore(self, memory: Memory) -> None:
         """Goes on from what was learned before (`hose_learning.study.run_folder`)."""
         self.memory = memory
-
-
-def _take(log: Log) -> Episodes:
-    """Empties a log."""
-    n = int(log.used[0])
-    log.used[0] = 0
-    return Episodes(log.episodes[:n, 0].copy(), log.episodes[:n, 1].copy(), log.returns[:n].copy())

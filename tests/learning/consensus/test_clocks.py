@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hose_learning.consensus.clocks import (
+from hose_learning.consensus import (
     ConsensusSettings,
     Messages,
     compute_clocks,

@@ -2,7 +2,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hose_learning.consensus.clocks import (
+from hose_learning.consensus import (
     ConsensusSettings,
     Messages,
     compute_clocks,

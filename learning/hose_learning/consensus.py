@@ -7,13 +7,18 @@ measured in turns of a clock that is neither fast nor slow: 1/v is the unit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 
 from hose_mj.errors import InputError
+from hose_mj.recording.palette import OTHERS, darken, format_hex
+from hose_mj.recording.plots.labels import label_line_ends
+from hose_mj.recording.plots.style import SOFT, encode_png, make_figure
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -101,13 +106,9 @@ class Action(NamedTuple):
 
 @dataclass(frozen=True)
 class Record:
-    """What a simulation saw.
+    """What a simulation saw: rates v_i (N,), turns per unit of time; clocks; actions as they began.
 
-    Attributes:
-        rates: v_i of each clock (N,), turns per unit of time.
-        clocks: xi_i at the beginning of each round (n_rounds, N).
-        actions: in the order in which they began.
-        round_time: time between two rows of `clocks`.
+    `clocks` are xi_i at the beginning of each round (n_rounds, N), `round_time` apart.
     """
 
     rates: Floats
@@ -146,12 +147,8 @@ def compute_clocks(history: Floats, messages: Messages, increments: Floats) -> F
         xi_i <- xi_i - sum_j a_ij (xi_i - xi_j) + v_i h,   a_ij = 1/N if j was heard, else 0
 
     It is the equation's discrete form: what was heard is weighed once a round, and a message says
-    what its sender's clock showed when it left.
-
-    Args:
-        history: the clocks of this round and of those before, newest first (n_kept, N).
-        messages: what arrives.
-        increments: v_i h of each clock (N,).
+    what its sender's clock showed when it left. `history` has the clocks of this round and of those
+    before, newest first (n_kept, N); `increments` are v_i h (N,).
     """
     clocks = history[0]
     n_agents = len(clocks)
@@ -261,15 +258,12 @@ def compute_longest_action(lead: float, drift: float) -> float:
     """Returns the longest action that surely ends before the next one begins, in turns.
 
     The agent after the owner of turn t begins when its clock reaches t + 1, so not before any clock
-    does. The furthest that any has been grows by at most 1 + drift per unit of time (a mean of what
-    clocks show or showed puts none beyond it) until the owner itself, being done, gives the turn.
-    So an action is over in time if lead + (1 + drift) A <= 1.
+    does. The furthest that any has been is at most `lead` into a turn when its owner begins, and
+    grows by at most 1 + drift per unit of time (a mean of what clocks show or showed puts none
+    beyond it) until the owner itself, being done, gives the turn. So an action is over in time if
+    lead + (1 + drift) A <= 1.
 
     The thesis's v = 1/T, a turn as long as the longest action, leaves no room for any disagreement.
-
-    Args:
-        lead: how far any clock has got into a turn when its owner begins, at most.
-        drift: largest relative error of a clock's rate.
     """
     return (1.0 - lead) / (1.0 + drift)
 
@@ -299,15 +293,11 @@ def compute_speed(settings: ConsensusSettings) -> float:
 def compute_disagreement(settings: ConsensusSettings, rates: Floats, n_rounds: int = 400) -> float:
     """Returns the standard deviation of the clocks about their common mean, in turns.
 
-    It is the square root of E[sum_i (xi_i - mean)^2] / N after `n_rounds` rounds from equal clocks,
-    agents that act left aside; it settles within some tens of rounds. Without delay the value is
+    It is the square root of E[sum_i (xi_i - mean)^2] / N after `n_rounds` rounds from equal clocks
+    with rates v_i (N,), agents that act left aside; it settles within some tens of rounds. Without
+    delay the value is
 
         sqrt((1 + p) / ((1 - p) (1 - lambda))) h std(v_i).
-
-    Args:
-        settings: the network.
-        rates: v_i of the clocks (N,).
-        n_rounds: number of rounds.
     """
     n, kept = settings.n_agents, settings.delay + 1
     arrive = 1.0 - settings.loss
@@ -348,3 +338,106 @@ def _compute_noise(settings: ConsensusSettings, second: Floats) -> Floats:
     terms = arrive * square - arrive**2 * mean_square
     np.fill_diagonal(terms, 0.0)
     return np.asarray(terms.sum(axis=1) / n**2)
+
+
+# Trials: what clocks do at one loss of messages, measured and drawn
+
+SETTLING_TURNS, MEASURED_TURNS = 10, 40
+"""Turns after which clocks that run alone have agreed, and turns measured from then on."""
+SHOWN_TURNS = 1.0
+"""Time during which the agreement is shown, in turns."""
+SHOWN_ACTIONS = 16
+
+
+class ConsensusTrial(NamedTuple):
+    """One loss: clocks that run alone, agents that act (`play`), and numbers for the document."""
+
+    settings: ConsensusSettings
+    clocks: Record
+    play: Record
+    record: dict[str, float]
+
+
+def run_trial(settings: ConsensusSettings, seed: int) -> ConsensusTrial:
+    """Simulates one loss, twice: clocks alone, and agents that act by them."""
+    alone, playing = np.random.default_rng(seed).spawn(2)
+    settling = SETTLING_TURNS * settings.rounds
+    n_rounds = settling + MEASURED_TURNS * settings.rounds
+    clocks = run_clocks(settings, alone, n_rounds)
+    play = simulate(settings, playing)
+    leads = compute_leads(play)
+    lead = float(leads.max()) if len(leads) else 1.0  # clocks so coarse that they skip all turns
+    reached = (play.clocks.max(axis=1) >= settings.first_turn).argmax()
+    duration = (len(play.times) - reached) * settings.round_time  # the last round is over too
+    record = {
+        "loss": settings.loss,
+        "first_spread": float(play.spreads[0]),
+        "agreed_spread": float(play.spreads[reached]),
+        "disagreement": float(np.sqrt(clocks.clocks[settling:].var(axis=1).mean())),
+        "exact_disagreement": compute_disagreement(settings, clocks.rates),
+        "actions": len(play.actions),
+        "disorder": count_disorder(play.actions, settings),
+        "overlaps": count_overlaps(play.actions),
+        "longest_safe_action": compute_longest_action(lead, settings.drift),
+        "turns_per_time": settings.n_turns / float(duration),
+    }
+    return ConsensusTrial(settings, clocks, play, record)
+
+
+def draw_consensus(trials: Sequence[ConsensusTrial], own: ConsensusTrial) -> bytes:
+    """Returns the PNG: disagreement of all trials over time above, the actions of one below."""
+    n = own.settings.n_agents
+    with make_figure((7.6, 5.6), f"{n} clocks agree on whose turn it is") as figure:
+        above, below = figure.subplots(2, 1, height_ratios=(3, 2))
+        ends = _draw_agreement(above, trials)
+        _draw_actions(below, own)
+        figure.draw_without_rendering()
+        label_line_ends(above, ends)
+        return encode_png(figure)
+
+
+def _draw_agreement(axes: Axes, trials: Sequence[ConsensusTrial]) -> list[tuple[float, str, str]]:
+    """Draws disagreement over time; returns where each line ends, its name and colour."""
+    ends = []
+    for place, trial in enumerate(trials):
+        color = OTHERS[place % len(OTHERS)]
+        clocks = trial.clocks
+        shown = clocks.times <= SHOWN_TURNS
+        deviations = clocks.clocks.std(axis=1)[shown]
+        axes.plot(clocks.times[shown], deviations, color=format_hex(color), lw=1.3)
+        exact = trial.record["exact_disagreement"]
+        if exact > 0.0:
+            axes.axhline(exact, color=format_hex(color), lw=0.9, ls=(0, (1.5, 1.5)))
+        name = f"{100.0 * trial.settings.loss:g} % lost"
+        ends.append((float(deviations[-1]), name, format_hex(darken(color))))
+    axes.set_yscale("log")
+    axes.set_xlim(0.0, SHOWN_TURNS)
+    axes.set_xlabel("time (turns); dotted: the exact value in the long run")
+    axes.set_ylabel("standard deviation\nof the clocks (turns)")
+    return ends
+
+
+def _draw_actions(axes: Axes, trial: ConsensusTrial) -> None:
+    """Draws a bar for each action, with its turn, on the line of its agent."""
+    settings = trial.settings
+    shown = trial.play.actions[:SHOWN_ACTIONS]
+    for action in shown:
+        color = OTHERS[action.agent % len(OTHERS)]
+        width = action.end - action.begin
+        axes.barh(action.agent, width, left=action.begin, height=0.55, color=format_hex(color))
+        axes.axvline(action.begin, color=SOFT, lw=0.5, ls=(0, (1, 3)), zorder=0)
+        axes.annotate(
+            str(action.turn),
+            (action.begin, action.agent - 0.3),
+            xytext=(0, 1),
+            textcoords="offset points",
+            fontsize=7.0,
+            color=SOFT,
+            va="bottom",
+        )
+    axes.grid(False)
+    axes.set_ylim(settings.n_agents - 0.5, -0.8)
+    axes.set_yticks(range(settings.n_agents), [f"agent {i}" for i in range(settings.n_agents)])
+    given = "given when the action is done" if settings.early_finish else "left to run out"
+    lost = f"{100.0 * settings.loss:g} % of messages lost"
+    axes.set_xlabel(f"time (turns); bars: who acts in which turn; {lost}, turns {given}")

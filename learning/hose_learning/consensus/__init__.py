@@ -1,1 +1,0 @@
-"""Agents that agree on whose turn it is, by messages."""

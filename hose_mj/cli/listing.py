@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from hose_mj.errors import InputError
+from hose_mj.cli.results import check_choice
 from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
 
@@ -25,8 +25,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Prints a list; 0 when done."""
-    if args.kind not in KINDS:
-        raise InputError("kind", args.kind, f"one of {', '.join(KINDS)}")
+    check_choice("kind", args.kind, KINDS)
     found = KINDS[args.kind]()
     if args.json:
         items = [{"name": name, "description": text} for name, text in found.items()]

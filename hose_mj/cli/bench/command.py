@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import importlib
-import sys
 import time
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from hose_mj.cli.check_table import print_checks
-from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
+from hose_mj.cli.results import check_choice, check_counts, finish, print_table
 
 if TYPE_CHECKING:
     from hose_mj.cli.bench import Bench
@@ -46,34 +44,21 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs a group; 1 if a check failed."""
-    if args.group not in GROUPS:
-        raise InputError("group", args.group, f"one of {', '.join(GROUPS)}")
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
+    check_choice("group", args.group, GROUPS)
+    check_counts(args, seed=0)
     begun = time.perf_counter()
     bench: Bench = importlib.import_module(GROUPS[args.group]).measure(args.quick, args.seed)
-    if args.json:
-        results = {"records": [asdict(record) for record in bench.records]}
-        print_document(make_document("bench", args, checks=bench.checks, results=results))
-    else:
-        _summarize(bench)
-    passed = sum(check.ok for check in bench.checks)
-    seconds = time.perf_counter() - begun
-    stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed} of {len(bench.checks)} checks ok, {seconds:.0f} s", file=stream)
-    return 0 if passed == len(bench.checks) else 1
+    results = {"records": [asdict(record) for record in bench.records]}
+    return finish("bench", args, bench.checks, results, partial(_summarize, bench), begun=begun)
 
 
 def _summarize(bench: Bench) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console()
-    table = Table(title="Speed on this machine")
-    for name in ("what", "value", "unit", "times its peer", "peer"):
-        table.add_column(name, justify="right" if name in ("value", "times its peer") else "left")
-    for record in bench.records:
-        ratio = "" if record.ratio is None else f"{record.ratio:,.3g}"
-        table.add_row(record.name, f"{record.value:,.4g}", record.unit, ratio, record.peer or "")
-    console.print(table)
-    print_checks(bench.checks)
+    rows = [
+        (
+            *(record.name, f"{record.value:,.4g}", record.unit),
+            *("" if record.ratio is None else f"{record.ratio:,.3g}", record.peer or ""),
+        )
+        for record in bench.records
+    ]
+    columns = ("what", ">value", "unit", ">times its peer", "peer")
+    print_table("Speed on this machine", columns, rows)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from hose_learning.experience import write_experience
 from hose_learning.prediction.classifiers import CLASSIFIERS
 from hose_learning.prediction.cross_validation import MEASURES, Score, compute_score
 from hose_learning.prediction.offline import Result, Study
-from hose_mj.checks import Check
 from hose_mj.recording.document import format_document
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.parquet import write_records
@@ -32,8 +30,8 @@ HEADINGS = {
 PLOTTED = {"accuracy": "accuracy", "specificity": "specificity: undesired moves found"}
 
 
-def print_study(study: Study, checks: Sequence[Check]) -> None:
-    """Prints a table for each agent, what stands in for what, and the checks."""
+def print_study(study: Study) -> None:
+    """Prints a table for each agent, and what stands in for what."""
     console = Console()
     for agent in study.experience.agent_names:
         console.print(make_table(study, agent))
@@ -42,8 +40,6 @@ def print_study(study: Study, checks: Sequence[Check]) -> None:
     console.print("* stand-ins. " + "; ".join(stand_ins) + ".")
     if study.table is not None:
         console.print("? accuracy is not between sensitivity and specificity: misprinted")
-    if checks:
-        console.print(make_check_table(checks))
 
 
 def make_table(study: Study, agent: str) -> Table:
@@ -87,19 +83,6 @@ def format_published(result: Result) -> list[str]:
     """Returns the thesis's measures, nothing where the table has none."""
     row = result.published.measures if result.published else {}
     return [f"{100 * row[name]:.1f}" if name in row else "" for name in MEASURES]
-
-
-def make_check_table(checks: Sequence[Check]) -> Table:
-    """Returns the checks, each with its limit."""
-    table = Table(title="Checks")
-    for name in ("", "what", "value", "limit"):
-        table.add_column(name, justify="left" if name in ("", "what") else "right")
-    for check in checks:
-        mark = "[green]ok[/]" if check.ok else "[red]failed[/]"
-        table.add_row(
-            mark, check.name, f"{check.value:.3g}", f"{check.comparison} {check.limit:.3g}"
-        )
-    return table
 
 
 def write_study(study: Study, document: dict[str, Any], folder: Path) -> None:

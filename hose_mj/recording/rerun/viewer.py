@@ -19,7 +19,7 @@ import rerun as rr
 
 from hose_mj.errors import HoseError
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.rerun.parts import TIMELINE
+from hose_mj.recording.rerun.parts import TIMELINE, is_listening, wait_until
 from hose_mj.recording.rerun.reading import read_recording
 
 DEBIAN_PACKAGES = ("mesa-vulkan-drivers", "libvulkan1")
@@ -50,15 +50,12 @@ class Viewer:
 
     def wait_until_listening(self, deadline: float) -> None:
         """Returns once the port answers; raises `HoseError` at the deadline (`time.monotonic`)."""
-        while True:
+
+        def answers() -> bool:
             self.check_alive()
-            try:
-                socket.create_connection((_HOST, self.port), timeout=0.5).close()
-                return
-            except OSError:
-                if time.monotonic() > deadline:
-                    raise HoseError("the viewer did not answer in time") from None
-                time.sleep(0.05)
+            return is_listening(_HOST, self.port)
+
+        wait_until(answers, deadline, "the viewer did not answer in time")
 
 
 @contextmanager

@@ -207,10 +207,7 @@ class WorldLog:
         line = [[mark.place, top]]
         pin = rr.LineStrips3D(line, colors=[BREAK_COLOR], radii=[0.0035 * scene.size])
         stream.log(path_of(scene, "break", "pin"), pin)
-        said: Any = {
-            "labels": [f"{self._label(mark.kind)}, {mark.time:.2f} s"],
-            "show_labels": True,
-        }
+        words = f"{self._label(mark.kind)}, {mark.time:.2f} s"
         style: Any = {"radii": 0.0, "colors": [BREAK_COLOR], "show_labels": True}
         label = rr.Points3D([top], labels=[words], **style)
         stream.log(path_of(scene, "break", "label"), label)

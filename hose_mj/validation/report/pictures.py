@@ -47,13 +47,19 @@ def draw_all(study: Study) -> Pictures:
     for result in study.results:
         if result.case.motion is not None and result.outcomes:
             pictures.update(_draw_motion(result, study))
-            if result.case.id == HERO and _has_hero_models(result):
+            models = {outcome.setting.model for outcome in result.outcomes}
+            if result.case.id == HERO and models & {"geds", "cable"}:
                 pictures["overview"] = draw_overview(result, study)
     for family, members in group_statics(study.results).items():
         pictures.update(_draw_statics(family, members))
     pictures.update(_draw_numerics(study))
     if study.user is not None and study.user.hose.duration is None and study.outcomes:
-        pictures.update(_draw_rest(study.results[0], study.shown_within))
+        # The rest shape that each model finds where it comes closest.
+        result = study.results[0]
+        shown = choose_shown(result, study.shown_within).values()
+        curves = {describe_setting(outcome): outcome.points for outcome in shown}
+        picture = plot_shapes(result.case.title, curves, choose_plane(curves.values()))
+        pictures[f"{result.case.id}-shapes"] = picture
     return pictures
 
 
@@ -92,16 +98,9 @@ def name_setting(outcome: RunResult) -> str:
 
 def describe_setting(outcome: RunResult) -> str:
     """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
-    setting = outcome.setting
-    size = find_model(setting.model).resolution.replace("_", " ")
-    step = "" if setting.timestep is None else f", {format_seconds(setting.timestep)}"
-    return f"{setting.model}, {setting.resolution} {size}{step}"
-
-
-def name_series(outcome: RunResult) -> str:
-    """Model id, or "geds planar" for GEDS in a plane."""
-    setting = outcome.setting
-    return "geds planar" if setting.model == "geds" and setting.planar else setting.model
+    size = find_model(outcome.setting.model).resolution.replace("_", " ")
+    resolution, comma, step = name_setting(outcome).partition(",")
+    return f"{outcome.setting.model}, {resolution} {size}{comma}{step}"
 
 
 def choose_ratios(ratios: Iterable[Ratio], case_id: str) -> list[Ratio]:
@@ -133,26 +132,19 @@ def draw_overview(result: CaseResult, study: Study) -> bytes:
     return plot_overview(curves, times, _list_work(result, study), gaps, (left, right))
 
 
-def _has_hero_models(result: CaseResult) -> bool:
-    return any(outcome.setting.model in ("geds", "cable") for outcome in result.outcomes)
-
-
 def _ratio_of(gap: Gap) -> float:
     return gap.cost_against / gap.cost
 
 
 def _list_work(result: CaseResult, study: Study) -> list[WorkPoint]:
     """A point for each run, and for each committed one of the cable where it cannot run."""
-    points = [
-        WorkPoint(
-            name_series(outcome),
-            name_setting(outcome),
-            outcome.error,
-            outcome.wall_s_per_sim_s or np.nan,
-            outcome.setting.clamp_corrected,
-        )
-        for outcome in result.outcomes
-    ]
+    points = []
+    for o in result.outcomes:
+        # GEDS in a plane is a series of its own.
+        model, cost = o.setting.model, o.wall_s_per_sim_s or np.nan
+        series = "geds planar" if model == "geds" and o.setting.planar else model
+        clamp = o.setting.clamp_corrected
+        points.append(WorkPoint(series, name_setting(o), o.error, cost, clamp))
     for record in study.committed.records if study.committed else ():
         if record["case"] == result.case.id and record["timestep"] is not None:
             label = f"{record['resolution']}, {format_seconds(record['timestep'])}"
@@ -195,18 +187,12 @@ def _draw_motion(result: CaseResult, study: Study) -> Pictures:
     outlines = compute_outlines(case.obstacles, plane)
     pictures[f"{case.id}-shapes"] = plot_shapes(case.title, curves, plane, times, outlines)
     if "geds" in shown and len(shown) > 1:
-        pictures[f"{case.id}-distance"] = _draw_distance(shown)
+        gaps, unit = _measure_gaps(shown)
+        title = f"Largest distance from GEDS {name_setting(shown['geds'])}"
+        t = shown["geds"].times
+        series = {f"{m} {name_setting(shown[m])}": (t, gap) for m, gap in gaps.items()}
+        pictures[f"{case.id}-distance"] = plot_series(title, f"distance ({unit})", series)
     return pictures
-
-
-def _draw_rest(result: CaseResult, within: float) -> Pictures:
-    """The rest shape that each model finds where it comes closest."""
-    curves = {
-        describe_setting(outcome): outcome.points
-        for outcome in choose_shown(result, within).values()
-    }
-    picture = plot_shapes(result.case.title, curves, choose_plane(curves.values()))
-    return {f"{result.case.id}-shapes": picture}
 
 
 def choose_plane(curves: Iterable[np.ndarray]) -> tuple[int, int]:
@@ -223,16 +209,6 @@ def _measure_gaps(shown: dict[str, RunResult]) -> tuple[dict[str, np.ndarray], s
     largest = max((float(gap.max()) for gap in gaps.values()), default=0.0)
     unit, factor = choose_length_unit(largest)
     return {model: factor * gap for model, gap in gaps.items()}, unit
-
-
-def _draw_distance(shown: dict[str, RunResult]) -> bytes:
-    ours = shown["geds"]
-    gaps, unit = _measure_gaps(shown)
-    return plot_series(
-        f"Largest distance from GEDS {name_setting(ours)}",
-        f"distance ({unit})",
-        {f"{m} {name_setting(shown[m])}": (ours.times, gap) for m, gap in gaps.items()},
-    )
 
 
 def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
@@ -279,7 +255,9 @@ def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> 
             if (outcome.setting.model, outcome.setting.clamp_corrected) == (model, corrected)
         ]
         if mine:
-            best = min(mine, key=lambda o: o.error if corrected is None else _far_from_20(o))
+            about_20 = [abs(outcome.setting.resolution - 20.0) for outcome in mine]
+            ranks = about_20 if corrected is not None else [outcome.error for outcome in mine]
+            best = mine[ranks.index(min(ranks))]
             curves[_parameter(result)] = best.points[0]
             resolution = best.setting.resolution
     if not curves:
@@ -288,10 +266,6 @@ def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> 
         return Fan(model, curves)
     name = f"{model}, {resolution} segments, clamp as documented"
     return Fan(name, curves, dotted=True)
-
-
-def _far_from_20(outcome: RunResult) -> int:
-    return abs(outcome.setting.resolution - 20)
 
 
 def _parameter(result: CaseResult) -> str:

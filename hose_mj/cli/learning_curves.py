@@ -121,7 +121,10 @@ def check_arguments(args: Args) -> None:
 def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     """Trains once; returns the mean of each measure in each bin (bins,)."""
     given = {field.name: getattr(args, field.name) for field in fields(train.LearnerArgs)}
-    given |= {"task": args.task, "learner": learner, "options": choose_options(args, learner)}
+    # Its own options, without its name, and those that name none.
+    ours = (word.removeprefix(f"{learner}.") for word in args.options)
+    own = tuple(word for word in ours if "." not in word.partition("=")[0])
+    given |= {"task": args.task, "learner": learner, "options": own}
     training = train.make_training(train.Args(**given, episodes=args.episodes, seed=seed))
     with compile_notice("learner's kernels"):
         training.advance(moves=0)
@@ -130,12 +133,6 @@ def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     parts = (np.array_split(np.asarray(value, float), args.bins) for value in values)
     means = (np.array([part.mean() for part in split]) for split in parts)
     return dict(zip(args.measures, means, strict=True))
-
-
-def choose_options(args: Args, learner: str) -> tuple[str, ...]:
-    """Chooses the options of one learner: its own, without its name, and those that name none."""
-    ours = (word.removeprefix(f"{learner}.") for word in args.options)
-    return tuple(word for word in ours if "." not in word.partition("=")[0])
 
 
 def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measured]]]) -> Panel:

@@ -100,9 +100,8 @@ def make_table(rows: list[Record], types: dict[str, type], metadata: dict[str, s
     for name in names:
         values = [row.get(name) for row in rows]
         kind = find_type(name, values, types.get(name))
-        columns[name] = pa.array(
-            [None if value is None else kind(value) for value in values], _ARROW_TYPES[kind]
-        )
+        plain = [None if value is None else kind(value) for value in values]
+        columns[name] = pa.array(plain, _ARROW_TYPES[kind])
     return pa.table(columns).replace_schema_metadata(metadata)
 
 

@@ -96,7 +96,9 @@ class Grasp:
         here = self.position
         for move in self.moves:
             if move.to is not None:
-                here = _blend(here, move.to, move.progress(time))
+                share = move.progress(time)
+                x, y, z = (a + (b - a) * share for a, b in zip(here, move.to, strict=True))
+                here = (x, y, z)
         return here
 
     def tangent_at(self, time: float) -> Vector | None:
@@ -198,11 +200,13 @@ def _read_position(table: TomlTable, key: str) -> Vector | None:
 
 def _read_tangent(table: TomlTable, clamped: bool) -> Vector | None:
     aim: Vector | None = table.vector("tangent")
-    if aim is not None and not clamped:
+    if aim is None:
+        return None
+    if not clamped:
         raise table.fail("tangent", list(aim), "left out for kind = 'attach'")
-    if aim is not None and math.hypot(*aim) < 1e-9:
+    if math.hypot(*aim) < 1e-9:
         raise table.fail("tangent", list(aim), "three numbers that are not all zero")
-    return None if aim is None else _scale(aim)
+    return _scale(aim)
 
 
 def _read_director(
@@ -237,11 +241,6 @@ def _check_reach(table: TomlTable, one: Grasp, other: Grasp, gap: float) -> None
             valid = f"within {gap:g} m, the hose between them, of the hold at {one.arc_length:g} m"
             where = "position" if time == 0.0 else f"position at {time:g} s"
             raise table.fail(where, [round(x, 6) for x in other.position_at(time)], valid)
-
-
-def _blend(one: Vector, other: Vector, share: float) -> Vector:
-    x, y, z = (a + (b - a) * share for a, b in zip(one, other, strict=True))
-    return x, y, z
 
 
 def turn_towards(one: Vector, other: Vector, share: float) -> Vector:

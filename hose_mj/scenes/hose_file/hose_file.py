@@ -141,7 +141,8 @@ def read_hose_file(path: Path) -> UserHose:
         errors=tuple(sorted(set(errors), reverse=True)),
         budget=budget,
     )
-    _check_held(user, file)
+    if not holds and (duration is None or start == "equilibrium"):
+        raise file.fail("holds", None, "one hold or more, or study.start = 'as-laid'")
     _check_shape(user, file)
     _check_floor(user, file)
     return user
@@ -187,14 +188,6 @@ def _read_times(study: TomlTable, holds: tuple[Grasp, ...]) -> tuple[float | Non
     if duration is not None and last is None and start == "equilibrium":
         raise study.fail("start", start, "'as-laid' where no hold moves: else nothing happens")
     return duration, start
-
-
-def _check_held(user: UserHose, file: TomlTable) -> None:
-    """There is no rest shape of a hose that nothing holds."""
-    if user.duration is not None and user.start == "as-laid":
-        return
-    if not user.holds:
-        raise file.fail("holds", None, "one hold or more, or study.start = 'as-laid'")
 
 
 def _check_shape(user: UserHose, file: TomlTable) -> None:

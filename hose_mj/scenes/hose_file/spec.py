@@ -80,11 +80,4 @@ def _read_fitting(table: TomlTable, length: float) -> Fitting:
     end = table.number("end", above=start, most=length)
     values = {key: table.find_number(key, above=0.0) for key in _FITTING_KEYS}
     table.finish()
-    return Fitting(
-        start=start,
-        end=end,
-        axial_stiffness=values["axial_stiffness"],
-        bending_stiffness=values["bending_stiffness"],
-        torsional_stiffness=values["torsional_stiffness"],
-        linear_density=values["linear_density"],
-    )
+    return Fitting(start=start, end=end, **values)

@@ -20,7 +20,7 @@ from hose_mj.recording.page import Block, Page, Picture, Section
 from hose_mj.recording.palette import name_model
 from hose_mj.recording.parquet import write_records
 from hose_mj.recording.plots.style import format_seconds
-from hose_mj.recording.rerun import write_recording
+from hose_mj.recording.rerun.comparison import write_recording
 from hose_mj.validation import settings
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.report.findings import describe_findings, make_answer_row

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -91,7 +92,8 @@ def run(args: Args) -> int:
         Check(f"{pair['first']} and {pair['second']} break alike", pair["same_cell"], AGREE, ">=")
         for pair in pairs
     ]
-    kinds = {model: _count(found) for model, found in endings.items()}
+    counts = {model: Counter(ending.kind for ending in found) for model, found in endings.items()}
+    kinds = {model: dict(sorted(count.items())) for model, count in counts.items()}
     results = {"kinds": kinds, "pairs": pairs}
     return finish("check-breaks", args, checks, results, lambda: _print(kinds, pairs))
 
@@ -130,11 +132,6 @@ def _describe(number: int, moves: Sequence[Move], endings: Mapping[str, Ending])
         ]
         record[model] = found
     return record
-
-
-def _count(endings: Sequence[Ending]) -> dict[str, int]:
-    kinds = [ending.kind for ending in endings]
-    return {kind: kinds.count(kind) for kind in sorted(set(kinds))}
 
 
 def _print(kinds: Mapping[str, Mapping[str, int]], pairs: Sequence[Mapping[str, Any]]) -> None:

@@ -21,7 +21,7 @@ from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.recording.sinks import Sink
 from hose_mj.rollout.capture import Capture
-from hose_mj.rollout.episode import EpisodeResult, Observer, Policy, run_episode
+from hose_mj.rollout.episode import EpisodeResult, Observer, run_episode
 from hose_mj.rollout.policies import POLICIES, make_policy
 from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.tasks.kernels import STEPS, TURN
@@ -252,17 +252,14 @@ def _check(args: Args) -> tuple[str, ...]:
     return args.models or (args.model,)
 
 
-def _make_policy(name: str) -> Policy:
-    if name in POLICIES:
-        return make_policy(name)
-    if not Path(name).is_dir():
-        valid = f"{', '.join(POLICIES)}, or the run folder of a learner"
-        raise InputError("policy", name, valid)
-    return SavedLearner(Path(name))
-
-
 def _roll_out(args: Args, scene: Scene, model: str, recording: Recording) -> Rollout:
-    policy = _make_policy(args.policy)
+    if args.policy in POLICIES:
+        policy = make_policy(args.policy)
+    elif Path(args.policy).is_dir():
+        policy = SavedLearner(Path(args.policy))
+    else:
+        valid = f"{', '.join(POLICIES)}, or the run folder of a learner"
+        raise InputError("policy", args.policy, valid)
     world = make_world(scene, model)
     monitor = Monitor(world)
     timed = _Timed(recording.make_observers())

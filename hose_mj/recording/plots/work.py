@@ -5,7 +5,7 @@ Arrows say how much more a peer costs at equal error.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,9 +98,9 @@ def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[
     """
     check_some("points", points)
     with make_axes(title, (8.4, 5.4)) as (figure, axes):
-        drawing = draw_work_precision(axes, points, gaps)
-        add_legend(figure, drawing.handles)
-        label_work_precision(figure, axes, drawing)
+        handles, label = _draw_work(figure, axes, points, gaps)
+        add_legend(figure, handles)
+        label()
         return encode_png(figure)
 
 
@@ -130,40 +130,31 @@ def plot_overview(
             where: Any = {"xycoords": "axes fraction", "xytext": (0, 7), "fontsize": 8.5}
             write_note(axes, rest, (0.0, 1.0), **where)
         stacks = {label: check_curve(label, curve)[:, :, [0, 2]] for label, curve in curves.items()}
-        handles = draw_shapes(left, stacks)
-        left.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.05, -0.13))
+        left.legend(
+            handles=draw_shapes(left, stacks), loc="upper left", bbox_to_anchor=(-0.05, -0.13)
+        )
         left.set_anchor("N")
-        drawing = draw_work_precision(right, points, gaps)
+        handles, label = _draw_work(figure, right, points, gaps, spacing=34.0)
         below: Any = {"loc": "upper left", "bbox_to_anchor": (-0.08, -0.13)}
-        right.legend(handles=drawing.handles, ncols=-(-len(drawing.handles) // 2), **below)
+        right.legend(handles=handles, ncols=-(-len(handles) // 2), **below)
         label_snapshots(figure, left, stacks, times)
-        label_work_precision(figure, right, drawing, spacing=34.0)
+        label()
         return encode_png(figure)
 
 
-@dataclass(frozen=True)
-class WorkDrawing:
-    """The parts of a plot that its legend and its labels have to know.
+def _draw_work(
+    figure: Figure,
+    axes: Axes,
+    points: Sequence[WorkPoint],
+    gaps: Sequence[Gap] = (),
+    spacing: float = 20.0,
+) -> tuple[list[Line2D], Callable[[], None]]:
+    """Draws all but the labels of points into axes.
 
-    Attributes:
-        handles: what the legend has to hold.
-        fronts: of the series that are not raw.
-        lines: x and y of what labels keep off.
-        notes: already written, with their arrows.
-        looks: by model.
+    Returns:
+        what the legend has to hold, and what labels front points `spacing` apart (points of
+        length) once the rest is laid out.
     """
-
-    handles: list[Line2D]
-    fronts: list[list[WorkPoint]]
-    lines: list[tuple[Array, Array]]
-    notes: list[Annotation]
-    looks: Mapping[str, Look]
-
-
-def draw_work_precision(
-    axes: Axes, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()
-) -> WorkDrawing:
-    """Draws all but the labels of points into axes."""
     drawn = [p for p in points if is_positive(p.error) and is_positive(p.wall_s_per_sim_s)]
     looks = choose_looks(list(dict.fromkeys(p.model for p in points)))
     fronts = {
@@ -186,18 +177,14 @@ def draw_work_precision(
         (np.array([p.wall_s_per_sim_s for p in front]), np.array([p.error for p in front]))
         for front in fronts.values()
     ]
-    handles = _make_handles(looks, drawn, len(points) - len(drawn))
     shown = [front for (_, raw), front in fronts.items() if not raw]
-    return WorkDrawing(handles, shown, lines, notes, looks)
 
+    def label() -> None:
+        figure.draw_without_rendering()
+        wanted = _choose_labels(axes, shown, looks, spacing)
+        label_points(figure, axes, wanted, lines, notes)
 
-def label_work_precision(
-    figure: Figure, axes: Axes, drawing: WorkDrawing, spacing: float = 20.0
-) -> None:
-    """Labels front points `spacing` apart (points of length), once the rest is laid out."""
-    figure.draw_without_rendering()
-    wanted = _choose_labels(axes, drawing.fronts, drawing.looks, spacing)
-    label_points(figure, axes, wanted, drawing.lines, drawing.notes)
+    return _make_handles(looks, drawn, len(points) - len(drawn)), label
 
 
 def compute_pareto_front(cost: Array, error: Array) -> Array:

@@ -102,7 +102,11 @@ def compute_framing(scene: Scene) -> Framing:
     axes = np.stack([np.cross(up, outward), up, outward])  # right, up, towards the eye
     seen = points @ axes.T
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    distance = _fit_distance(seen - middle, size)
+    # From there the eye sees all points.
+    about = seen - middle
+    room = np.maximum(np.abs(about[:, 0]) / _ASPECT, np.abs(about[:, 1]))
+    needed = float(np.max(1.25 * room / HALF_VIEW + about[:, 2]))
+    distance = max(needed, 0.25 * size / HALF_VIEW)
     half_height = distance * HALF_VIEW
     left = seen[:, 0].min() - middle[0] - 0.3 * half_height
     left = float(np.clip(left, -1.1 * half_height, -0.9 * half_height))
@@ -119,13 +123,6 @@ def compute_framing(scene: Scene) -> Framing:
         corner=(middle + np.array([left, 0.8 * half_height, 0.0])) @ axes,
         is_planar=bool(flat),
     )
-
-
-def _fit_distance(seen: Array, size: float) -> float:
-    """Returns how far from the target the eye sees all points (k, 3): right, up, towards it."""
-    room = np.maximum(np.abs(seen[:, 0]) / _ASPECT, np.abs(seen[:, 1]))
-    needed = float(np.max(1.25 * room / HALF_VIEW + seen[:, 2]))
-    return max(needed, 0.25 * size / HALF_VIEW)
 
 
 def _choose_directions(flat: list[int]) -> tuple[Array, Array]:

@@ -140,7 +140,8 @@ class WorldLog:
         if not self._look.rank:
             middle = 0.5 * (tension[:, :-1] + tension[:, 1:])
             colors = color_tension(middle, self.scene.tension_limit).reshape(-1, 3)
-            styles["colors"] = pack_colors(colors)
+            red, green, blue = colors.astype(np.uint32).T  # Rerun keeps one integer, opaque
+            styles["colors"] = (red << 24) | (green << 16) | (blue << 8) | np.uint32(255)
         columns = rr.LineStrips3D.columns(strips=pieces, **styles).partition([n] * k)
         self.stream.send_columns(path_of(self.scene, "hose"), index, columns)
         if self.scene.n_control_points:
@@ -222,9 +223,3 @@ def list_kinds(scene: SceneDescription) -> list[tuple[str, str]]:
     """Lists unit and kind of the scene's margins, each pair once."""
     margins: tuple[Margin, ...] = scene.margins
     return list(dict.fromkeys((margin.unit, margin.kind) for margin in margins))
-
-
-def pack_colors(colors: Any) -> Any:
-    """Packs red, green, blue (n, 3) into the integers that Rerun keeps, opaque."""
-    wide = np.asarray(colors, dtype=np.uint32)
-    return (wide[:, 0] << 24) | (wide[:, 1] << 16) | (wide[:, 2] << 8) | np.uint32(255)

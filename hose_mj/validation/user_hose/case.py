@@ -95,7 +95,9 @@ def starts_at_rest(user: UserHose) -> bool:
 
 def compute_fineness(user: UserHose) -> int:
     """Returns the factor by which a hose is resolved finer: two turns of a coil count as one."""
-    return max(1, math.ceil(count_turns(user) / 2.0))
+    curvature, torsion = user.spec.rest_curvature, user.spec.rest_torsion
+    turns = math.hypot(curvature, torsion) * user.spec.length / math.tau
+    return max(1, math.ceil(turns / 2.0)) if curvature else 1
 
 
 def make_obstacles(user: UserHose) -> tuple[Obstacle, ...]:
@@ -256,14 +258,6 @@ def make_line(user: UserHose) -> Line:
     s = np.concatenate([pieces[0][0][:1], *(piece[0][1:] for piece in pieces)])
     points = np.concatenate([pieces[0][1][:1], *(piece[1][1:] for piece in pieces)])
     return _interpolate(s, points)
-
-
-def count_turns(user: UserHose) -> float:
-    """Turns of the coil that a hose is at rest; 0 for one that is straight then."""
-    spec = user.spec
-    if spec.rest_curvature == 0.0:
-        return 0.0
-    return math.hypot(spec.rest_curvature, spec.rest_torsion) * spec.length / math.tau
 
 
 def choose_director(user: UserHose, line: Line) -> Array:

@@ -135,7 +135,8 @@ class Case:
 
 
 @cache
-def _read_texts() -> dict[str, dict[str, str]]:
+def read_texts() -> dict[str, dict[str, str]]:
+    """Reads the words of our cases: `title`, `about`, perhaps `prefix`, by family or id."""
     return tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))
 
 
@@ -147,7 +148,7 @@ def make_case(family: str, parameter: str = "", **facts: Any) -> Case:
         parameter: stands behind the family in its id, and in its title; "" where it is alone.
         facts: what else makes a `Case`.
     """
-    texts = _read_texts()
+    texts = read_texts()
     text = texts.get(f"{family}-{parameter}") or texts[family]
     id = f"{family}-{text.get('prefix', '')}{parameter}" if parameter else family
     title = text["title"].format(parameter)

@@ -100,9 +100,7 @@ class TomlTable:
     ) -> float | None:
         """A number in a range like that of `number`; None where there is none."""
         value = self.value(key)
-        return (
-            None if value is None else self._check_number(key, value, least, LARGEST_NUMBER, above)
-        )
+        return None if value is None else self.number(key, least=least, above=above)
 
     def vector(self, key: str, default: Sequence[float] | None = None) -> Any:
         """Three numbers as a tuple; the default where there are none."""

@@ -10,7 +10,8 @@ import numpy as np
 from hose_mj import HoseSpec
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.plots.curves import plot_twist
+from hose_mj.recording.plots.labels import label_line_ends
+from hose_mj.recording.plots.style import SOFT, choose_looks, encode_png, make_figure
 
 CONTROL_POINTS = 16
 SPEC = HoseSpec(
@@ -38,8 +39,26 @@ def draw_twist() -> bytes:
         hose = GedsHose(SPEC, control_points=CONTROL_POINTS, twist=form)
         hose.reset(points)
         twists[label], shape = hose.twist(s), hose.position(s)
-    knots = np.arange(1, CONTROL_POINTS - 3) / (CONTROL_POINTS - 3)
-    return plot_twist("Twist of an S-shaped hose that nobody turned", s, shape, twists, knots)
+    looks, heights, rates = choose_looks(list(twists)), [], []
+    with make_figure((7.6, 5.0), "Twist of an S-shaped hose that nobody turned") as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+        for name, dim, dashes in (("y", 1, "-"), ("z", 2, (0, (5, 2)))):
+            above.plot(s, shape[:, dim], color="#444444", ls=dashes)
+            heights.append((float(shape[-1, dim]), name, "#444444"))
+        above.set_ylabel("shape (m)")
+        figure.draw_without_rendering()
+        label_line_ends(above, heights)
+        for label, twist in twists.items():
+            below.plot(s, twist, color=looks[label].color, ls=looks[label].dashes)
+            rates.append((float(twist[-1]), label, looks[label].ink))
+        for knot in np.arange(1, CONTROL_POINTS - 3) / (CONTROL_POINTS - 3):
+            below.axvline(knot, color=SOFT, lw=0.5, ls=(0, (1, 3)), zorder=0)
+        below.set_xlim(0.0, 1.0)
+        below.set_xlabel("arc length (m)")
+        below.set_ylabel("twist (rad/m)")
+        figure.draw_without_rendering()
+        label_line_ends(below, rates)
+        return encode_png(figure)
 
 
 if __name__ == "__main__":

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
 from hose_mj.checks import Check
-from hose_mj.cli.check_table import print_checks
 from hose_mj.cli.progress import show_progress
+from hose_mj.cli.results import check_choice, check_counts, finish
+from hose_mj.constraints.limits import Limits
 from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
-
-if TYPE_CHECKING:
-    from hose_mj.rollout.break_sequences import Ending, Move
+from hose_mj.rollout.break_sequences import Ending, EndingsFile, Move, draw_sequences, play_all
+from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+from hose_mj.world.initial_shape import count_control_points
+from hose_mj.world.registry import WORLDS, make_world
 
 AGREE = 0.9
 QUICK = 20
@@ -60,13 +62,11 @@ class Args:
 
 def run(args: Args) -> int:
     """Plays all sequences; 1 if two models agree in less than 90 % of them."""
-    _check(args)
-    from hose_mj.constraints.limits import Limits
-    from hose_mj.rollout.break_sequences import EndingsFile, draw_sequences, play_all
-    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
-    from hose_mj.world.initial_shape import count_control_points
-    from hose_mj.world.registry import make_world
-
+    check_counts(args, sequences=1, moves=1, seed=0)
+    if len(set(args.models)) < max(2, len(args.models)):
+        raise InputError("models", args.models, "at least two, each once")
+    for model in args.models:
+        check_choice("models", model, WORLDS)
     models = QUICK_MODELS if args.quick else args.models
     number = min(args.sequences, QUICK) if args.quick else args.sequences
     limits = Limits(max_tension=args.max_tension)
@@ -92,18 +92,10 @@ def run(args: Args) -> int:
         Check(f"{pair['first']} and {pair['second']} break alike", pair["same_cell"], AGREE, ">=")
         for pair in pairs
     ]
-    if args.json:
-        kinds = {model: _count(found) for model, found in endings.items()}
-        results = {"kinds": kinds, "pairs": pairs}
-        document = make_document("check-breaks", args, checks=checks, results=results)
-        print_document(document)
-    else:
-        for model, found in endings.items():
-            counts = _count(found)
-            print(f"{model}: " + ", ".join(f"{counts[kind]} {kind}" for kind in counts))
-        _print_pairs(pairs)
-        print_checks(checks)
-    return 0 if all(check.ok for check in checks) else 1
+    counts = {model: Counter(ending.kind for ending in found) for model, found in endings.items()}
+    kinds = {model: dict(sorted(count.items())) for model, count in counts.items()}
+    results = {"kinds": kinds, "pairs": pairs}
+    return finish("check-breaks", args, checks, results, lambda: _print(kinds, pairs))
 
 
 def compare_models(
@@ -142,12 +134,9 @@ def _describe(number: int, moves: Sequence[Move], endings: Mapping[str, Ending])
     return record
 
 
-def _count(endings: Sequence[Ending]) -> dict[str, int]:
-    kinds = [ending.kind for ending in endings]
-    return {kind: kinds.count(kind) for kind in sorted(set(kinds))}
-
-
-def _print_pairs(pairs: Sequence[Mapping[str, Any]]) -> None:
+def _print(kinds: Mapping[str, Mapping[str, int]], pairs: Sequence[Mapping[str, Any]]) -> None:
+    for model, counts in kinds.items():
+        print(f"{model}: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()))
     for pair in pairs:
         names = pair["first"], pair["second"]
         print(
@@ -163,18 +152,3 @@ def _print_pairs(pairs: Sequence[Mapping[str, Any]]) -> None:
                     texts = [f"{k} {v:.4g}" for k, v in margins.items() if k != "turn"]
                     print(f"    least margins in move {margins['turn']}: {', '.join(texts)}")
     print()
-
-
-def _check(args: Args) -> None:
-    from hose_mj.world.registry import WORLDS
-
-    for name in ("sequences", "moves"):
-        if getattr(args, name) < 1:
-            raise InputError(name, getattr(args, name), "a whole number above 0")
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
-    if len(set(args.models)) < max(2, len(args.models)):
-        raise InputError("models", args.models, "at least two, each once")
-    for model in args.models:
-        if model not in WORLDS:
-            raise InputError("models", model, "of " + ", ".join(WORLDS))

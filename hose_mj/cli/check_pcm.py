@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 import tyro
+from hose_learning.mdp.partially_constrained import (
+    PAIRS,
+    PROPERTIES,
+    Pair,
+    PcmViolation,
+    Propositions,
+    WrittenPair,
+    compute_propositions,
+    find_violations,
+    make_tasks,
+    write_pair,
+)
 
 from hose_mj.checks import Check
-from hose_mj.cli.check_table import print_checks
+from hose_mj.cli.results import check_choice, check_counts, finish
 from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
-
-if TYPE_CHECKING:
-    from hose_learning.mdp.partially_constrained import (
-        Pair,
-        PcmViolation,
-        Propositions,
-        WrittenPair,
-    )
+from hose_mj.recording.files import write_atomically
 
 
 @dataclass(frozen=True)
@@ -59,20 +64,9 @@ class Args:
 
 def run(args: Args) -> int:
     """Checks a pair; 1 if it is not a PCM."""
-    import numpy as np
-    from hose_learning.mdp.partially_constrained import (
-        compute_propositions,
-        find_violations,
-        make_tasks,
-        write_pair,
-    )
-
-    from hose_mj.recording.files import write_atomically
-
     if args.list:
         return list_pairs(args)
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
+    check_counts(args, seed=0)
     if not 0.0 <= args.discount < 1.0:
         raise InputError("discount", args.discount, "a number from 0 up to, but not including, 1")
     pair = choose_pair(args)
@@ -84,16 +78,10 @@ def run(args: Args) -> int:
     if args.out is not None and propositions is not None:
         title = args.example or f"{args.source} to {args.target}"
         write_atomically(args.out / "pcm.png", draw_values(title, propositions))
-    if args.json:
-        results = make_results(pair, written, violations, propositions)
-        print_document(make_document("check-pcm", args, checks=checks, results=results))
-    else:
-        _summarize(pair, written, violations, propositions)
-        print_checks(checks)
-    passed = sum(check.ok for check in checks)
-    stream = sys.stderr if args.json else sys.stdout
-    print("a PCM" if not violations else "not a PCM", file=stream)
-    return 0 if passed == len(checks) else 1
+    found = (pair, written, violations, propositions)
+    ending = "a PCM" if not violations else "not a PCM"
+    results = make_results(*found)
+    return finish("check-pcm", args, checks, results, lambda: _summarize(*found), ending=ending)
 
 
 def choose_pair(args: Args) -> Pair:
@@ -102,26 +90,20 @@ def choose_pair(args: Args) -> Pair:
     Raises:
         InputError: an unknown example, an example with tasks or options, or tasks left out.
     """
-    from hose_learning.mdp.partially_constrained import PAIRS, Pair
-
     if args.example is not None:
-        if args.example not in PAIRS:
-            raise InputError("example", args.example, "one of " + ", ".join(PAIRS))
+        check_choice("example", args.example, PAIRS)
         if args.source is not None or args.set:
             raise InputError("example", args.example, "an example without tasks and options")
         return PAIRS[args.example]
     if args.source is None or args.target is None:
-        raise InputError(
-            "tasks", (args.source, args.target), "two ids, SOURCE TARGET, or --example"
-        )
+        given = (args.source, args.target)
+        raise InputError("tasks", given, "two ids, SOURCE TARGET, or --example")
     options = read_options(args.set, ("source", "target"))
     return Pair("", args.source, args.target, options[""], options["source"], options["target"])
 
 
 def make_checks(violations: list[PcmViolation], propositions: Propositions | None) -> list[Check]:
     """Makes the checks: four properties, and for a PCM the two propositions."""
-    from hose_learning.mdp.partially_constrained import PROPERTIES
-
     counts = {violation.number: violation.count for violation in violations}
     checks = [
         Check(f"property {number}: exceptions ({says})", counts.get(number, 0), 0, "==")
@@ -174,8 +156,6 @@ def make_results(
 
 def list_pairs(args: Args) -> int:
     """Prints the ready pairs."""
-    from hose_learning.mdp.partially_constrained import PAIRS
-
     if args.json:
         pairs = [{"name": name, **asdict(pair)} for name, pair in PAIRS.items()]
         print_document(make_document("check-pcm", args, results={"pairs": pairs}))
@@ -204,8 +184,6 @@ def _summarize(
 
 def draw_values(title: str, propositions: Propositions) -> bytes:
     """Returns the PNG: the bound of each target state and what greedy transfer gets, over V_t*."""
-    import numpy as np
-
     from hose_mj.recording.palette import OTHERS, format_hex
     from hose_mj.recording.plots.style import SOFT, add_legend, encode_png, make_axes
 

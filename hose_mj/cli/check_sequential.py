@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from functools import partial
+from typing import Annotated, Literal
 
+import numpy as np
 import tyro
+from hose_learning.mdp.sequential_realization import (
+    PROPERTIES,
+    SequentialStudy,
+    study_sequential,
+)
 
 from hose_mj.checks import Check
-from hose_mj.cli.check_table import print_checks
-from hose_mj.cli.task_options import read_options
-from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
-
-if TYPE_CHECKING:
-    from hose_learning.mdp.sequential_realization import SequentialStudy
+from hose_mj.cli.results import check_counts, finish
+from hose_mj.cli.task_options import parse_options
+from hose_mj.tasks.registry import make_task
+from hose_mj.tasks.stream import make_stream
 
 
 @dataclass(frozen=True)
@@ -45,15 +48,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Checks a task; 1 if a property does not hold."""
-    import numpy as np
-    from hose_learning.mdp.sequential_realization import PROPERTIES, study_sequential
-
-    from hose_mj.tasks.registry import make_task
-    from hose_mj.tasks.stream import make_stream
-
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
-    task = make_task(args.task, **read_options(args.set)[""])
+    check_counts(args, seed=0)
+    task = make_task(args.task, **parse_options(args.set))
     start = task.reset(make_stream(np.random.default_rng(args.seed)))
     study = study_sequential(task, [start], args.idle, args.sharing, args.limit)
     counts = {violation.number: violation.count for violation in study.violations}
@@ -61,17 +57,9 @@ def run(args: Args) -> int:
         Check(f"property {number}: exceptions ({says})", counts.get(number, 0), 0, "==")
         for number, says in PROPERTIES.items()
     ]
-    if args.json:
-        print_document(
-            make_document("check-sequential", args, checks=checks, results=asdict(study))
-        )
-    else:
-        _summarize(study)
-        print_checks(checks)
-    stream = sys.stderr if args.json else sys.stdout
-    realizes = not study.violations
-    print("a sequential realization" if realizes else "not a sequential realization", file=stream)
-    return 0 if realizes else 1
+    ending = f"{'not ' * bool(study.violations)}a sequential realization"
+    show = partial(_summarize, study)
+    return finish("check-sequential", args, checks, asdict(study), show, ending=ending)
 
 
 def _summarize(study: SequentialStudy) -> None:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from hose_mj.recording.document import make_document, print_document
+from hose_mj.cli.progress import show_progress
+from hose_mj.cli.results import finish, make_folder
+from hose_mj.recording.document import make_document
 
 if TYPE_CHECKING:
-    from hose_learning.prediction.offline import OfflinePlan, Study
+    from hose_learning.prediction.offline import Study
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,12 @@ def run(args: Args) -> int:
     from hose_learning.prediction.attributes import Encoding
     from hose_learning.prediction.offline import (
         OfflinePlan,
+        count_folds,
         list_checks,
         list_records,
         run_study,
     )
     from hose_learning.prediction.report import print_study, write_study
-
-    from hose_mj.cli.check_table import print_checks
-    from hose_mj.cli.compare import make_folder
 
     begun = time.perf_counter()
     if args.out is not None:
@@ -78,23 +76,15 @@ def run(args: Args) -> int:
         cluster_rule=args.clusters,
         seed=args.seed,
     )
-    with show_progress(plan) as advance:
-        study = run_study(plan, advance)
+    with show_progress("folds", count_folds(plan)) as advance:
+        study = run_study(plan, partial(advance, 1))
     checks = list_checks(study)
     results = {"log": describe_log(study), "records": list_records(study)}
-    document = make_document("classifiers", args, checks=checks, results=results)
     if args.out is not None:
+        document = make_document("classifiers", args, checks=checks, results=results)
         write_study(study, document, args.out)
-    if args.json:
-        print_document(document)
-    else:
-        print_study(study)
-        print_checks(checks)
-    stream = sys.stderr if args.json else sys.stdout
-    passed = sum(check.ok for check in checks)
-    seconds = time.perf_counter() - begun
-    print(f"{passed} of {len(checks)} checks ok, {seconds:.0f} s", file=stream)
-    return 0 if passed == len(checks) else 1
+    show = partial(print_study, study)
+    return finish("classifiers", args, checks, results, show, begun=begun)
 
 
 def describe_log(study: Study) -> list[dict[str, object]]:
@@ -108,16 +98,3 @@ def describe_log(study: Study) -> list[dict[str, object]]:
         }
         for agent, name in enumerate(experience.agent_names)
     ]
-
-
-@contextmanager
-def show_progress(plan: OfflinePlan) -> Iterator[Callable[[], object]]:
-    """A bar on stderr over all folds; nothing where that is no terminal."""
-    from hose_learning.prediction.offline import count_folds
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("folds", total=count_folds(plan))
-        yield lambda: progress.advance(bar)

@@ -164,7 +164,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             ("hose-mj warm", "hose-mj warm hose world"),
         ),
         "bench": Command(
-            "hose_mj.cli.bench.command",
+            "hose_mj.cli.bench",
             "measure speed beside peers that people know",
             ("hose-mj bench hose --quick",),
         ),

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from hose_mj.cli.results import check_counts, make_folder, print_checks, print_table
 from hose_mj.errors import InputError
 from hose_mj.extras import is_installed, require
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from hose_mj.validation.case import Case
     from hose_mj.validation.study import Study
     from hose_mj.validation.user_hose.study import UserHoseStudy
@@ -92,12 +91,10 @@ def run(args: Args) -> int:
         print_user_hose(study.user)
     else:
         print_cases(study)
-    failed = [check for check in study.checks if not check.ok]
-    seconds = time.perf_counter() - begun
-    passed = f"{len(study.checks) - len(failed)} of {len(study.checks)} checks ok"
-    stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed}, {seconds:.0f} s\nreport: {where}", file=stream)
-    return 1 if failed else 0
+    passed, seconds = sum(check.ok for check in study.checks), time.perf_counter() - begun
+    counted = f"{passed} of {len(study.checks)} checks ok, {seconds:.0f} s"
+    print(f"{counted}\nreport: {where}", file=sys.stderr if args.json else sys.stdout)
+    return 0 if passed == len(study.checks) else 1
 
 
 def check_report(args: Args) -> bool:
@@ -159,7 +156,7 @@ def check_arguments(args: Args) -> tuple[Case, ...]:
         raise InputError("model", "cable", valid)
     if not args.models:
         raise InputError("models", args.models, f"one or more of {', '.join(MODELS)}")
-    _check_seed(args.seed)
+    check_counts(args, seed=0)
     found = find_cases(args.cases)
     cases = tuple(case for case in found if set(case.models) & set(args.models))
     if not cases:
@@ -181,31 +178,11 @@ def prepare_user_hose(args: Args, path: Path) -> Callable[[Callable[[str], None]
     if args.cases:
         raise InputError("cases", args.cases, "none beside a hose of your own")
     models = list_models() if args.models == MODELS else check_models(args.models)
-    _check_seed(args.seed)
+    check_counts(args, seed=0)
     hose = read_hose_file(find_hose_file(path))
     if args.quick:
         hose = replace(hose, budget=hose.budget * QUICK_SHARE)
-    return lambda advance: study_user_hose(hose, models, advance)
-
-
-def _check_seed(seed: int) -> None:
-    if seed < 0:
-        raise InputError("seed", seed, "a whole number, at least 0")
-
-
-def make_folder(out: Path) -> None:
-    """Makes the folder `out` unless it is there.
-
-    Raises:
-        InputError: it cannot be made or written to.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        valid = f"a folder, or a place where one can be made ({error.strerror})"
-        raise InputError("out", str(out), valid) from error
-    if not os.access(out, os.W_OK):
-        raise InputError("out", str(out), "a folder that you may write to")
+    return partial(study_user_hose, hose, models)
 
 
 @contextmanager
@@ -224,14 +201,7 @@ def show_progress() -> Iterator[Callable[[str], None]]:
 
 def print_cases(study: Study) -> None:
     """Prints checks and ratios on stdout; and the cable's committed runs, where it cannot run."""
-    from rich.console import Console
-
-    console = Console()
-    marks = {True: "[green]ok[/]", False: "[red]failed[/]"}
-    rows = [
-        (marks[c.ok], c.name, f"{c.value:.3g}", f"{c.comparison} {c.limit:g}") for c in study.checks
-    ]
-    _print_table(console, "Checks", ("", "what", ">value", ">limit"), rows)
+    print_checks(study.checks)
     if study.ratios:
         title = "Wall time at equal error, each model at its cheapest setting"
         ratios = [
@@ -241,13 +211,11 @@ def print_cases(study: Study) -> None:
             )
             for r in study.ratios
         ]
-        _print_table(
-            console, title, ("case", ">error", ">times cheaper", "GEDS", "against"), ratios
-        )
+        print_table(title, ("case", ">error", ">times cheaper", "GEDS", "against"), ratios)
     if study.committed is not None:
         cable = study.committed
         title = f"MuJoCo's cable, committed: run with MuJoCo {cable.mujoco}, not {cable.here}"
-        _print_table(console, title, ("case", ">runs", ">smallest error"), cable.summarize())
+        print_table(title, ("case", ">runs", ">smallest error"), cable.summarize())
 
 
 def print_user_hose(study: UserHoseStudy) -> None:
@@ -263,19 +231,4 @@ def print_user_hose(study: UserHoseStudy) -> None:
     console.print()
     title = "The cheapest setting within a wanted error (of the length)"
     names = (">wanted", "model", ">resolution", ">step", ">error", ">wall s / sim s")
-    rows = [make_answer_row(answer, study.cut_short) for answer in study.answers]
-    _print_table(console, title, names, rows)
-
-
-def _print_table(
-    console: Console, title: str, columns: Sequence[str], rows: Iterable[Iterable[str]]
-) -> None:
-    """Prints a table; columns whose names begin with ">" are aligned right."""
-    from rich.table import Table
-
-    table = Table(title=title)
-    for name in columns:
-        table.add_column(name.removeprefix(">"), justify="right" if name[:1] == ">" else "left")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
+    print_table(title, names, [make_answer_row(one, study.cut_short) for one in study.answers])

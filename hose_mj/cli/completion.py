@@ -13,7 +13,9 @@ from typing import Annotated
 import tyro
 
 from hose_mj.cli.commands import COMMANDS
-from hose_mj.errors import HoseError, InputError
+from hose_mj.cli.listing import KINDS
+from hose_mj.cli.results import check_choice
+from hose_mj.errors import HoseError
 from hose_mj.recording.document import make_document, print_document
 
 NAMED = {
@@ -74,8 +76,7 @@ class Args:
 def run(args: Args) -> int:
     """Prints the script; 0 when done."""
     scripts = {"bash": make_bash, "zsh": lambda words: ZSH + make_bash(words), "fish": make_fish}
-    if args.shell not in scripts:
-        raise InputError("shell", args.shell, f"one of {', '.join(scripts)}")
+    check_choice("shell", args.shell, scripts)
     words = collect_words()
     if args.json:
         print_document(make_document("completion", args, results={"commands": words}))
@@ -86,8 +87,6 @@ def run(args: Args) -> int:
 
 def collect_words() -> dict[str, dict[str, list[str]]]:
     """Returns for each command its options with the names that each takes; "" for no option."""
-    from hose_mj.cli.listing import KINDS
-
     names: dict[str, list[str]] = {}
     for kind in sorted({*NAMED.values(), "environments"}):
         try:
@@ -131,11 +130,10 @@ def make_bash(words: dict[str, dict[str, list[str]]]) -> str:
 
 def make_fish(words: dict[str, dict[str, list[str]]]) -> str:
     """Returns the script for fish."""
+    first = "complete -c hose-mj -n __fish_use_subcommand -f -a"
+    about = {name: entry.summary.replace("'", "\\'") for name, entry in COMMANDS.items()}
     lines = ["# hose-mj for fish: put it into ~/.config/fish/completions/hose-mj.fish"]
-    first = "complete -c hose-mj -n __fish_use_subcommand"
-    for command, entry in COMMANDS.items():
-        about = entry.summary.replace("'", "\\'")
-        lines.append(f"{first} -f -a {command} -d '{about}'")
+    lines += [f"{first} {command} -d '{text}'" for command, text in about.items()]
     for command, options in words.items():
         here = f"complete -c hose-mj -n '__fish_seen_subcommand_from {command}'"
         for option, known in options.items():

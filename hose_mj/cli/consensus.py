@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hose_learning.consensus import ConsensusSettings
+
 from hose_mj.checks import Check
-from hose_mj.cli.check_table import print_checks
-from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
+from hose_mj.cli.results import check_counts, finish, print_table
+from hose_mj.recording.files import write_atomically
 
 if TYPE_CHECKING:
-    from hose_learning.consensus import ConsensusSettings, ConsensusTrial
+    from hose_learning.consensus import ConsensusTrial
 
 LOSSES = (0.0, 0.1, 0.5)
 """Shares of lost messages that are always tried, beside the one asked for."""
@@ -62,34 +62,8 @@ def run(args: Args) -> int:
     """Runs the trials; 1 if a check failed."""
     from hose_learning.consensus import draw_consensus, run_trial
 
-    from hose_mj.recording.files import write_atomically
-
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
-    asked = make_settings(args)
-    losses = sorted({*LOSSES, asked.loss})
-    trials = [run_trial(replace(asked, loss=loss), args.seed) for loss in losses]
-    checks = [check for trial in trials for check in make_checks(trial)]
-    picture = args.out / "consensus.png"
-    own = next(trial for trial in trials if trial.settings.loss == asked.loss)
-    write_atomically(picture, draw_consensus(trials, own))
-    if args.json:
-        results = {"records": [trial.record for trial in trials], "picture": picture}
-        print_document(make_document("consensus", args, checks=checks, results=results))
-    else:
-        _summarize(trials)
-        print_checks(checks)
-    passed = sum(check.ok for check in checks)
-    stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed} of {len(checks)} checks ok\npicture: {picture}", file=stream)
-    return 0 if passed == len(checks) else 1
-
-
-def make_settings(args: Args) -> ConsensusSettings:
-    """Makes the settings that the arguments describe."""
-    from hose_learning.consensus import ConsensusSettings
-
-    return ConsensusSettings(
+    check_counts(args, seed=0)
+    asked = ConsensusSettings(
         n_agents=args.agents,
         loss=args.loss,
         delay=args.delay,
@@ -100,43 +74,42 @@ def make_settings(args: Args) -> ConsensusSettings:
         early_finish=not args.wait,
         falls_back=args.falls_back,
     )
+    losses = sorted({*LOSSES, asked.loss})
+    trials = [run_trial(replace(asked, loss=loss), args.seed) for loss in losses]
+    checks = [check for trial in trials for check in make_checks(trial)]
+    picture = args.out / "consensus.png"
+    own = next(trial for trial in trials if trial.settings.loss == asked.loss)
+    write_atomically(picture, draw_consensus(trials, own))
+    passed = sum(check.ok for check in checks)
+    results = {"records": [trial.record for trial in trials], "picture": picture}
+    ending = f"{passed} of {len(checks)} checks ok\npicture: {picture}"
+    return finish("consensus", args, checks, results, lambda: _summarize(trials), ending=ending)
 
 
 def make_checks(trial: ConsensusTrial) -> list[Check]:
     """Makes the checks of one loss."""
     found = trial.record
     name = f"loss {100.0 * trial.settings.loss:g} %: "
+    safe = found["longest_safe_action"]
     exact = SCATTER * found["exact_disagreement"] + 1e-9  # equal clocks differ by rounding alone
     return [
         Check(name + "spread when the first turn begins", found["agreed_spread"], LARGEST_SPREAD),
         Check(name + "disagreement against its exact value", found["disagreement"], exact),
         Check(name + "turns out of order", found["disorder"], 0, "=="),
         Check(name + "actions begun during another", found["overlaps"], 0, "=="),
-        Check(
-            name + "longest action that is surely safe",
-            found["longest_safe_action"],
-            trial.settings.action_time,
-            ">=",
-        ),
+        Check(name + "longest action that is surely safe", safe, trial.settings.action_time, ">="),
     ]
 
 
 def _summarize(trials: list[ConsensusTrial]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    settings = asdict(trials[0].settings)
-    table = Table(title=f"{settings['n_agents']} clocks in consensus (unit: one turn)")
+    title = f"{trials[0].settings.n_agents} clocks in consensus (unit: one turn)"
     columns = {
-        "lost": ("loss", "{:.0%}"),
-        "first spread": ("first_spread", "{:.3g}"),
-        "spread, agreed": ("agreed_spread", "{:.2g}"),
-        "disagreement": ("disagreement", "{:.3g}"),
-        "exact": ("exact_disagreement", "{:.3g}"),
-        "turns per unit": ("turns_per_time", "{:.3g}"),
+        ">lost": ("loss", "{:.0%}"),
+        ">first spread": ("first_spread", "{:.3g}"),
+        ">spread, agreed": ("agreed_spread", "{:.2g}"),
+        ">disagreement": ("disagreement", "{:.3g}"),
+        ">exact": ("exact_disagreement", "{:.3g}"),
+        ">turns per unit": ("turns_per_time", "{:.3g}"),
     }
-    for name in columns:
-        table.add_column(name, justify="right")
-    for trial in trials:
-        table.add_row(*(form.format(trial.record[key]) for key, form in columns.values()))
-    Console().print(table)
+    rows = [[form.format(t.record[key]) for key, form in columns.values()] for t in trials]
+    print_table(title, list(columns), rows)

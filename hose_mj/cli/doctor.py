@@ -87,14 +87,8 @@ class Finding:
 
     def as_record(self) -> dict[str, Any]:
         """Returns the finding as it stands in a document; `remedy` is null where all is well."""
-        return {
-            "name": self.name,
-            "value": self.value,
-            "limit": self.limit,
-            "ok": self.ok,
-            "state": self.state,
-            "remedy": None if self.satisfied else self.remedy,
-        }
+        facts = {"name": self.name, "value": self.value, "limit": self.limit, "ok": self.ok}
+        return {**facts, "state": self.state, "remedy": None if self.satisfied else self.remedy}
 
 
 def run(args: Args) -> int:
@@ -196,10 +190,9 @@ def examine_kernel_cache() -> Finding:
 def examine_viewer() -> Finding:
     """Looks for the Rerun viewer's program, which comes with rerun-sdk."""
     places = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", "")])
-    found = shutil.which("rerun", path=places)
-    remedy = "pip install 'hose-mj[viewer]'"
-    wanted = "the program rerun"
-    return Finding("viewer", found or "not found", wanted, found is not None, remedy, False)
+    found = shutil.which("rerun", path=places) or ""
+    facts = ("the program rerun", bool(found), "pip install 'hose-mj[viewer]'")
+    return Finding("viewer", found or "not found", *facts, False)
 
 
 def examine_vulkan() -> Finding:

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
+from hose_mj.cli.results import check_choice
 from hose_mj.constraints.monitor import Monitor
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
@@ -91,7 +92,10 @@ class Desk:
 
     def _obey(self, key: int) -> None:
         if ord("0") <= key <= ord("9"):
-            self._choose(key - ord("0"))
+            robot = key - ord("0")
+            if robot < self.world.n_robots:
+                self.robot = robot
+                self._tell(f"robot {robot}: {self.world.scene.robots[robot].name}")
         elif key in ARROWS or key in HEIGHT:
             step = np.array((ARROWS | HEIGHT)[key])
             self.driver.targets[self.robot] += step * self.world.scene.cell_size
@@ -102,30 +106,14 @@ class Desk:
             self.monitor.reset()
             self.driver.drive_to(self.world.site_positions()[:-1])
 
-    def _choose(self, robot: int) -> None:
-        if robot < self.world.n_robots:
-            self.robot = robot
-            self._tell(f"robot {robot}: {self.world.scene.robots[robot].name}")
-
-
-def check_display(what: str) -> None:
-    """Raises `InputError` where a window cannot be opened.
-
-    Args:
-        what: needs the window.
-    """
-    if sys.platform == "linux" and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
-        valid = "a display (DISPLAY or WAYLAND_DISPLAY); without one, hose-mj rollout --save F.rrd"
-        raise InputError(f"display for {what}", None, valid)
-
 
 def run(args: Args) -> int:
     """Opens the viewer; 0 when its window is closed."""
-    if args.model not in WORLDS:
-        raise InputError("model", args.model, "one of " + ", ".join(WORLDS))
-    check_display("drive")
+    check_choice("model", args.model, WORLDS)
+    named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform == "linux" and not named:
+        valid = "a display (DISPLAY or WAYLAND_DISPLAY); without one, hose-mj rollout --save F.rrd"
+        raise InputError("display for drive", None, valid)
     desk = Desk(make_world(args.scene, args.model), lambda line: print(line, file=sys.stderr))
     print(HELP, file=sys.stderr)
     _show(desk)

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import partial
+from typing import Annotated, Any
 
+import numpy as np
 import tyro
+from hose_learning.learners import catalog
+from hose_learning.mdp.joint_policy import (
+    JointMove,
+    count_fewest_moves,
+    estimate,
+    make_evaluate,
+    play_composed,
+)
+from hose_learning.settings import Exploration
+from hose_learning.study import training as study
 
-from hose_mj.cli.check_table import print_checks
+from hose_mj.checks import Check
+from hose_mj.cli.results import check_choice, check_counts, finish, print_table
 from hose_mj.cli.task_options import parse_options
 from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
-
-if TYPE_CHECKING:
-    from hose_learning.mdp.joint_policy import JointMove
-    from hose_learning.study.training import Training
-
-    from hose_mj.tasks.task import Task
+from hose_mj.jit import compile_notice
+from hose_mj.tasks.exact import enumerate_joint
+from hose_mj.tasks.registry import make_task
+from hose_mj.tasks.stream import make_stream
+from hose_mj.tasks.task import Task
 
 LARGEST = 20_000
 """Most states of a task whose joint optimum is searched."""
@@ -51,20 +61,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Learns and composes; 1 if the joint moves do not reach the goal, or not the shortest way."""
-    import numpy as np
-    from hose_learning.mdp.joint_policy import (
-        count_fewest_moves,
-        estimate,
-        make_evaluate,
-        play_composed,
-    )
-
-    from hose_mj.checks import Check
-    from hose_mj.tasks.exact import enumerate_joint
-    from hose_mj.tasks.registry import make_task
-    from hose_mj.tasks.stream import make_stream
-
-    _check(args)
+    check_counts(args, episodes=1, moves=1, seed=0)
+    if not catalog.find_learner(args.learner).composes:
+        known = [id for id, entry in catalog.list_learners().items() if entry.composes]
+        check_choice("learner", args.learner, known)
     begun = time.perf_counter()
     task = make_task(args.task, **parse_options(args.set))
     training_seed, play_seed, start_seed = np.random.default_rng(args.seed).spawn(3)
@@ -83,40 +83,15 @@ def run(args: Args) -> int:
         Check("the joint moves reach the goal (1 yes, 0 no)", float(reached), 1, "=="),
         Check("joint moves, against the fewest there are", len(moves), fewest),
     ]
-    if args.json:
-        results = {"joint_moves": _list(task, moves), "reached": reached, "fewest": fewest}
-        print_document(make_document("joint-policy", args, checks=checks, results=results))
-    else:
-        _print(task, moves)
-        print_checks(checks)
-    passed = sum(check.ok for check in checks)
-    seconds = time.perf_counter() - begun
-    stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
-    return 0 if passed == len(checks) else 1
+    results = {"joint_moves": _list(task, moves), "reached": reached, "fewest": fewest}
+    show = partial(_print, task, moves)
+    return finish("joint-policy", args, checks, results, show, begun=begun)
 
 
-def _check(args: Args) -> None:
-    from hose_learning.learners import catalog
-
-    for name, least in (("episodes", 1), ("moves", 1), ("seed", 0)):
-        if getattr(args, name) < least:
-            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
-    if not catalog.find_learner(args.learner).composes:
-        known = [id for id, entry in catalog.list_learners().items() if entry.composes]
-        raise InputError("learner", args.learner, "one of " + ", ".join(known))
-
-
-def _train(task: Task, args: Args, generator: Any) -> Training:
-    from hose_learning.learners import catalog
-    from hose_learning.settings import Exploration
-    from hose_learning.study.training import Training
-
-    from hose_mj.jit import compile_notice
-
+def _train(task: Task, args: Args, generator: np.random.Generator) -> study.Training:
     exploration = Exploration(per_episode=min(1.0, 2.0 / args.episodes))
     settings = catalog.make_settings(args.learner, task, exploration=exploration)
-    training = Training(task, args.learner, settings, generator)
+    training = study.Training(task, args.learner, settings, generator)
     with compile_notice("learner's kernels"):
         training.advance(episodes=args.episodes)
     return training
@@ -137,14 +112,10 @@ def _list(task: Task, moves: list[JointMove]) -> list[dict[str, Any]]:
 
 
 def _print(task: Task, moves: list[JointMove]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=f"Joint policy of {task.id} from its initial state")
-    for name in ("move", *task.agents, "value expected", *task.layout, "events"):
-        table.add_column(name)
+    rows = []
     for number, (move, row) in enumerate(zip(moves, _list(task, moves), strict=True), start=1):
         places = (" ".join(map(str, move.state[part])) for part in task.layout.values())
         events = ", ".join(row["events"])
-        table.add_row(str(number), *row["actions"], f"{row['value']:.1f}", *places, events)
-    Console().print(table)
+        rows.append((str(number), *row["actions"], f"{row['value']:.1f}", *places, events))
+    columns = ("move", *task.agents, "value expected", *task.layout, "events")
+    print_table(f"Joint policy of {task.id} from its initial state", columns, rows)

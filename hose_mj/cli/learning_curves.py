@@ -15,6 +15,7 @@ from hose_learning.study.training import Episodes
 
 from hose_mj.cli import train
 from hose_mj.cli.progress import show_progress
+from hose_mj.cli.results import check_counts
 from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
 from hose_mj.jit import compile_notice
@@ -90,14 +91,12 @@ def run(args: Args) -> int:
     panels = [make_panel(name, x, measured) for name in args.measures]
     title = args.title or ", ".join([args.task, *args.set])
     write_atomically(args.save, plot_learning(title, "episodes", panels))
-    results: dict[str, Any] = {
-        "picture": str(args.save),
-        "curves": list_records(args.measures, panels),
-    }
+    records = list_records(args.measures, panels)
+    results: dict[str, Any] = {"picture": str(args.save), "curves": records}
     if args.json:
         print_document(make_document("curves", args, seed=args.seed, results=results))
     else:
-        for record in results["curves"]:
+        for record in records:
             last = "nothing" if record["mean"][-1] is None else f"{record['mean'][-1]:.3g}"
             print(f"{record['learner']}: {record['measure']} {last} in the last bin")
         print(f"picture: {args.save}")
@@ -106,13 +105,9 @@ def run(args: Args) -> int:
 
 def check_arguments(args: Args) -> None:
     """Raises `InputError` for a number or a name outside its valid set."""
-    for name in ("episodes", "bins", "seeds"):
-        if getattr(args, name) < 1:
-            raise InputError(name, getattr(args, name), "a whole number, at least 1")
+    check_counts(args, episodes=1, bins=1, seeds=1, seed=0)
     if args.bins > args.episodes:
         raise InputError("bins", args.bins, f"at most one for each of {args.episodes} episodes")
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
     for name, given, known in (
         ("learners", args.learners, list(catalog.list_learners())),
         ("measures", args.measures, list(MEASURES)),
@@ -126,17 +121,11 @@ def check_arguments(args: Args) -> None:
 def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     """Trains once; returns the mean of each measure in each bin (bins,)."""
     given = {field.name: getattr(args, field.name) for field in fields(train.LearnerArgs)}
-    own = choose_options(args, learner)
-    training = train.make_training(
-        train.Args(
-            **given,
-            task=args.task,
-            learner=learner,
-            options=own,
-            episodes=args.episodes,
-            seed=seed,
-        )
-    )
+    # Its own options, without its name, and those that name none.
+    ours = (word.removeprefix(f"{learner}.") for word in args.options)
+    own = tuple(word for word in ours if "." not in word.partition("=")[0])
+    given |= {"task": args.task, "learner": learner, "options": own}
+    training = train.make_training(train.Args(**given, episodes=args.episodes, seed=seed))
     with compile_notice("learner's kernels"):
         training.advance(moves=0)
     ended = training.advance(episodes=args.episodes)
@@ -144,12 +133,6 @@ def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     parts = (np.array_split(np.asarray(value, float), args.bins) for value in values)
     means = (np.array([part.mean() for part in split]) for split in parts)
     return dict(zip(args.measures, means, strict=True))
-
-
-def choose_options(args: Args, learner: str) -> tuple[str, ...]:
-    """Chooses the options of one learner: its own, without its name, and those that name none."""
-    ours = (word.removeprefix(f"{learner}.") for word in args.options)
-    return tuple(word for word in ours if "." not in word.partition("=")[0])
 
 
 def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measured]]]) -> Panel:

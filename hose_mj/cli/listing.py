@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import tyro
 
-from hose_mj.errors import InputError
+from hose_mj.cli.results import check_choice
 from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
 
@@ -25,8 +27,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Prints a list; 0 when done."""
-    if args.kind not in KINDS:
-        raise InputError("kind", args.kind, f"one of {', '.join(KINDS)}")
+    check_choice("kind", args.kind, KINDS)
     found = KINDS[args.kind]()
     if args.json:
         items = [{"name": name, "description": text} for name, text in found.items()]
@@ -36,6 +37,12 @@ def run(args: Args) -> int:
     for name, text in found.items():
         print(f"{name:{width}}  {text}".rstrip())
     return 0
+
+
+def _describe(module: str, attribute: str) -> dict[str, str]:
+    """Names and descriptions of what a module lists."""
+    found = getattr(importlib.import_module(module), attribute)()
+    return {name: entry.description for name, entry in found.items()}
 
 
 def list_scenes() -> dict[str, str]:
@@ -73,13 +80,6 @@ def list_materials() -> dict[str, str]:
     return {name: entry.title for name, entry in read_catalogue().materials.items()}
 
 
-def list_models() -> dict[str, str]:
-    """Models of a hose."""
-    from hose_mj.hoses import registry
-
-    return {name: entry.description for name, entry in registry.list_models().items()}
-
-
 def list_policies() -> dict[str, str]:
     """Policies of `hose-mj rollout`."""
     from hose_mj.rollout.policies import POLICIES
@@ -89,13 +89,6 @@ def list_policies() -> dict[str, str]:
         name: about.get(name, f"drives until the constraint breaks: {name.removeprefix('break-')}")
         for name in POLICIES
     } | {"RUN": "the folder of a run: a learner that hose-mj train line has saved"}
-
-
-def list_tasks() -> dict[str, str]:
-    """Tasks that can be learned."""
-    from hose_mj.tasks import registry
-
-    return {name: entry.description for name, entry in registry.list_tasks().items()}
 
 
 def list_learners() -> dict[str, str]:
@@ -112,16 +105,16 @@ def list_environments() -> dict[str, str]:
     require("rl", "hose-mj list environments")
     from hose_mj.envs import name_environment
 
-    return {name_environment(task): text for task, text in list_tasks().items()}
+    return {name_environment(task): text for task, text in KINDS["tasks"]().items()}
 
 
 KINDS: dict[str, Callable[[], dict[str, str]]] = {
     "scenes": list_scenes,
     "hoses": list_hoses,
     "materials": list_materials,
-    "models": list_models,
+    "models": partial(_describe, "hose_mj.hoses.registry", "list_models"),
     "policies": list_policies,
-    "tasks": list_tasks,
+    "tasks": partial(_describe, "hose_mj.tasks.registry", "list_tasks"),
     "learners": list_learners,
     "environments": list_environments,
 }

@@ -43,14 +43,10 @@ class CommandModule(Protocol):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one command line and returns the exit status.
+    """Runs one command line, by default that of this process, and returns the exit status.
 
-    Args:
-        argv: the words after the program's name; those of this process by default.
-
-    Returns:
-        0 done, 1 a check failed, 2 bad input, 3 the machine refused, 130 interrupted, 141 nobody
-        reads the output any more.
+    It is 0 done, 1 a check failed, 2 bad input, 3 the machine refused, 130 interrupted, 141 nobody
+    reads the output any more.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if sys.stdout is None or sys.stderr is None:  # closed by whoever started this
@@ -222,12 +218,8 @@ def parse_arguments(name: str, arguments: type[Any], words: Sequence[str]) -> An
     shown = io.TextIOWrapper(io.BytesIO(), getattr(sys.stdout, "encoding", None) or "utf-8")
     try:
         with redirect_stdout(shown) if asks else nullcontext():
-            return tyro.cli(
-                arguments,
-                prog=f"hose-mj {name}",
-                args=list(words),
-                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
-            )
+            config = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
+            return tyro.cli(arguments, prog=f"hose-mj {name}", args=list(words), config=config)
     except SystemExit:
         if asks:
             shown.seek(0)
@@ -261,11 +253,9 @@ def make_help() -> str:
     for group, commands in GROUPS.items():
         lines += ["", group]
         for name, command in commands.items():
-            head = f"  {name}".ljust(indent)
-            after = " " * indent
-            lines += textwrap.wrap(
-                command.summary, width, initial_indent=head, subsequent_indent=after
-            )
+            head, after = f"  {name}".ljust(indent), " " * indent
+            style: dict[str, Any] = {"initial_indent": head, "subsequent_indent": after}
+            lines += textwrap.wrap(command.summary, width, **style)
     return "\n".join([*lines, "", _wrap(ENDING), ""])
 
 

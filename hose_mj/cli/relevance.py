@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import partial
+from typing import Annotated, Any
 
+import numpy as np
 import tyro
+from hose_learning.experience import record_experience
+from hose_learning.relevance import (
+    Relevance,
+    count_unexplained,
+    find_relevance,
+    list_candidates,
+    list_signals,
+)
 
-from hose_mj.cli.check_table import print_checks
+from hose_mj.checks import Check
+from hose_mj.cli.results import check_counts, finish, print_table
 from hose_mj.cli.task_options import parse_options
-from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
-
-if TYPE_CHECKING:
-    from hose_learning.relevance import Relevance
-    from rich.table import Table
-
-    from hose_mj.checks import Check
+from hose_mj.tasks.registry import make_task
 
 WIDEST = 6
 """Most signals that stand side by side."""
@@ -55,21 +58,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs the algorithm; 1 if a fresh log contradicts what it found."""
-    import numpy as np
-    from hose_learning.experience import record_experience
-    from hose_learning.relevance import (
-        count_unexplained,
-        find_relevance,
-        list_candidates,
-        list_signals,
-    )
-
-    from hose_mj.checks import Check
-    from hose_mj.tasks.registry import make_task
-
-    for name, least in (("moves", 1), ("logs", 1), ("fresh", 1), ("seed", 0)):
-        if getattr(args, name) < least:
-            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
+    check_counts(args, moves=1, logs=1, fresh=1, seed=0)
     begun = time.perf_counter()
     task = make_task(args.task, **parse_options(args.set))
     signals = list_signals(task)
@@ -87,21 +76,13 @@ def run(args: Args) -> int:
         )
         for signal in signals
     ]
-    if args.json:
-        print_document(make_document("relevance", args, checks=checks, results=_list(found)))
-    else:
-        _print(found, checks, f"{args.task}, {args.moves:,} random moves")
-    passed = sum(check.ok for check in checks)
-    seconds = time.perf_counter() - begun
-    stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
-    return 0 if passed == len(checks) else 1
+    title = f"{args.task}, {args.moves:,} random moves"
+    show = partial(_print, found, title)
+    return finish("relevance", args, checks, _list(found), show, begun=begun)
 
 
 def _list(found: list[Relevance]) -> dict[str, Any]:
     """The signals, what matters for them in the first log, and in which share of all logs."""
-    import numpy as np
-
     first = found[0]
     share = np.mean([each.relevant for each in found], axis=0)
     return {
@@ -129,47 +110,35 @@ def _find_most_common(found: list[Relevance], place: int) -> dict[str, Any]:
     return {"relevant": relevant, "logs": logs}
 
 
-def _print(found: list[Relevance], checks: list[Check], title: str) -> None:
+def _print(found: list[Relevance], title: str) -> None:
     """Prints variables by signals, or a row for each signal where there are many."""
-    from rich.console import Console
-
     first = found[0]
-    wide = len(first.signals) > WIDEST
     title += f", {len(found)} logs" if len(found) > 1 else ""
-    Console().print(_make_list(first, title) if wide else _make_matrix(found, title))
+    if len(first.signals) > WIDEST:
+        many = zip(first.signals, first.n_seen.tolist(), strict=True)
+        rows = [(s.name, ", ".join(first.list_relevant(s)), f"{n_seen:,}") for s, n_seen in many]
+        print_table(title, ("signal", "variables that matter", "moves with it"), rows)
+    else:
+        _print_matrix(found, title)
     for place, signal in enumerate(first.signals if len(found) > 1 else ()):
         most = _find_most_common(found, place)
         print(f"{signal.name}: {', '.join(most['relevant'])} in {most['logs']} of {len(found)}")
-    print_checks(checks)
 
 
-def _make_matrix(found: list[Relevance], title: str) -> Table:
-    """Variables by signals: a checkmark, or in how many logs one matters."""
+def _print_matrix(found: list[Relevance], title: str) -> None:
+    """Prints variables by signals: a checkmark, or in how many logs one matters."""
+    from rich.console import Console
     from rich.table import Table
 
-    first = found[0]
+    first, n_logs = found[0], len(found)
     table = Table("variable", title=title)
     for signal in first.signals:
         table.add_column(signal.name, justify="center")
-    for place, variable in enumerate(first.variables):
-        row = [
-            sum(int(each.relevant[place, k]) for each in found) for k in range(len(first.signals))
-        ]
-        if len(found) == 1:
-            cells = ["✓" if count else "" for count in row]
-        else:
-            cells = [f"{count} of {len(found)}" if count else "" for count in row]
+    counts = np.sum([each.relevant for each in found], axis=0)
+    for variable, row in zip(first.variables, counts.tolist(), strict=True):
+        texts = ("✓" if n_logs == 1 else f"{count} of {n_logs}" for count in row)
+        cells = (text if count else "" for text, count in zip(texts, row, strict=True))
         table.add_row(variable, *cells)
     table.add_section()
     table.add_row("moves with it", *(f"{int(n):,}" for n in first.n_seen))
-    return table
-
-
-def _make_list(first: Relevance, title: str) -> Table:
-    """What matters for each signal, in the first log."""
-    from rich.table import Table
-
-    table = Table("signal", "variables that matter", "moves with it", title=title)
-    for signal, n_seen in zip(first.signals, first.n_seen.tolist(), strict=True):
-        table.add_row(signal.name, ", ".join(first.list_relevant(signal)), f"{n_seen:,}")
-    return table
+    Console().print(table)

@@ -15,7 +15,7 @@ from hose_learning.study.jobs import do_all
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
-from hose_mj.errors import InputError
+from hose_mj.cli.results import check_choice, check_counts
 from hose_mj.recording.document import make_document, print_document
 
 
@@ -46,12 +46,8 @@ class Args:
 def run(args: Args) -> int:
     """Runs the experiments; 1 if a check failed."""
     for item in args.items:
-        if item not in EXPERIMENTS:
-            raise InputError("item", item, "one of " + ", ".join(EXPERIMENTS))
-    for name, least in (("seeds", 1), ("seed", 0), ("workers", 1)):
-        value = getattr(args, name)
-        if value is not None and value < least:
-            raise InputError(name, value, f"a whole number, at least {least}")
+        check_choice("item", item, EXPERIMENTS)
+    check_counts(args, seeds=1, seed=0, workers=1)
     begun = time.perf_counter()
     seeds = range(args.seed, args.seed + (2 if args.quick else args.seeds))
     found: list[tuple[str, Experiment, list[Finding]]] = []
@@ -109,14 +105,8 @@ def _print(item: str, experiment: Experiment, findings: list[Finding]) -> None:
         check = finding.check
         mark = {"holds": "[green]ok[/]", "fails": "[red]fails[/]"}.get(_judge(check), "")
         limit = "" if check is None else f"{check.comparison} {check.limit:g}"
-        table.add_row(
-            finding.claim,
-            finding.thesis,
-            f"{finding.ours:.3g}",
-            f"{low:.3g} to {high:.3g}",
-            mark,
-            limit,
-        )
+        numbers = (f"{finding.ours:.3g}", f"{low:.3g} to {high:.3g}")
+        table.add_row(finding.claim, finding.thesis, *numbers, mark, limit)
     console = Console(width=None if sys.stdout.isatty() else 150)
     console.print(table)
     console.print(f"[dim]{experiment.reading}[/]")

@@ -18,8 +18,8 @@ from hose_learning.study.statistics import compute_rate_interval
 from hose_learning.study.training import Episodes, Training, join
 
 from hose_mj.cli.progress import defer_interrupt, show_progress
+from hose_mj.cli.results import check_choice, check_counts, print_table
 from hose_mj.cli.task_options import parse_options
-from hose_mj.errors import InputError
 from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.tasks.registry import TASKS, make_task
@@ -93,7 +93,11 @@ def run(args: Args) -> int:
     if args.list:
         _list()
         return 0
-    _check(args)
+    check_counts(args, episodes=1, moves=1, tests=1, seed=0)
+    if args.values is not None:
+        check_choice("values", args.values, VALUES)
+    if args.vetoes is not None:
+        check_choice("vetoes", args.vetoes, VETOES)
     folder, training, seed, args = _resume(args) if args.resume else _begin(args)
     before = training.moves
     begun = time.perf_counter()
@@ -112,18 +116,6 @@ def run(args: Args) -> int:
     else:
         _print(summary)
     return 0
-
-
-def _check(args: Args) -> None:
-    for name in ("episodes", "moves", "tests"):
-        value = getattr(args, name)
-        if value is not None and value < 1:
-            raise InputError(name, value, "a whole number, at least 1")
-    if args.seed < 0:
-        raise InputError("seed", args.seed, "a whole number, at least 0")
-    for name, choices in (("values", VALUES), ("vetoes", VETOES)):
-        if getattr(args, name) not in (None, *choices):
-            raise InputError(name, getattr(args, name), "one of " + ", ".join(choices))
 
 
 def make_training(args: Args) -> Training:
@@ -189,9 +181,8 @@ def _explore(args: Args, task: Task) -> Exploration:
     if fall is None:
         half = 2.0 * epsilon / _count_episodes(args, task)
         fall = 0.0 if args.epsilon_per_success else min(half, 1.0)
-    return Exploration(
-        epsilon=epsilon, per_episode=fall, per_success=args.epsilon_per_success or 0.0
-    )
+    success = args.epsilon_per_success or 0.0
+    return Exploration(epsilon=epsilon, per_episode=fall, per_success=success)
 
 
 def _count_episodes(args: Args, task: Task) -> int:
@@ -200,9 +191,8 @@ def _count_episodes(args: Args, task: Task) -> int:
 
 def _compile(training: Training) -> None:
     """Runs the loop and the test once on a training of its own, so that compiling is not timed."""
-    trial = Training(
-        training.task, training.learner_id, training.settings, np.random.default_rng(0)
-    )
+    parts = (training.task, training.learner_id, training.settings)
+    trial = Training(*parts, np.random.default_rng(0))
     trial.advance(moves=1)
     trial.test(1, max_moves=1)
 
@@ -255,18 +245,11 @@ def _summarize(
 
 
 def _list() -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console()
-    for title, lines in (
-        ("Tasks", [(id, "", entry.description) for id, entry in TASKS.items()]),
-        ("Learners", [(id, e.section, e.description) for id, e in catalog.list_learners().items()]),
-    ):
-        table = Table(title=title, box=None, title_justify="left", show_header=False)
-        for line in lines:
-            table.add_row(*line)
-        console.print(table)
+    style: dict[str, Any] = {"box": None, "title_justify": "left", "show_header": False}
+    tasks = [(id, "", entry.description) for id, entry in TASKS.items()]
+    learners = [(id, e.section, e.description) for id, e in catalog.list_learners().items()]
+    print_table("Tasks", ("", "", ""), tasks, **style)
+    print_table("Learners", ("", "", ""), learners, **style)
 
 
 def _print(summary: dict[str, Any]) -> None:

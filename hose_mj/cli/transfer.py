@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import partial
+from typing import Annotated, Any
 
+import numpy as np
 import tyro
+from hose_learning.study.statistics import compute_rate_interval
+from hose_learning.transfer import TransferOutcome, TransferPlan, run_trial
 
-from hose_mj.cli.check_table import print_checks
+from hose_mj.checks import Check
+from hose_mj.cli.progress import show_progress
+from hose_mj.cli.results import check_counts, finish, print_table
 from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
-from hose_mj.recording.document import make_document, print_document
-
-if TYPE_CHECKING:
-    from hose_learning.transfer import TransferOutcome
+from hose_mj.jit import compile_notice
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,9 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs all configurations; 1 if a veto was lost or the first control did better."""
-    from hose_mj.checks import Check
-
-    _check(args)
+    check_counts(args, moves=1, episodes=1, configurations=1, seed=0)
+    if not args.exchange or min(args.exchange) <= 0.0:
+        raise InputError("exchange", args.exchange, "numbers above 0, at least one")
     begun = time.perf_counter()
     outcomes = _run_all(args)
     rows = summarize(outcomes, args.exchange)
@@ -62,35 +64,13 @@ def run(args: Args) -> int:
         Check("transferred vetoes that were lost", sum(o.vetoes_lost for o in outcomes), 0, "=="),
         Check("goals after transfer, less the first control's", ahead, 0, ">="),
     ]
-    if args.json:
-        results = {"summary": rows, "outcomes": [asdict(outcome) for outcome in outcomes]}
-        print_document(make_document("transfer", args, checks=checks, results=results))
-    else:
-        _print(args, outcomes, rows)
-        print_checks(checks)
-    passed = sum(check.ok for check in checks)
-    seconds = time.perf_counter() - begun
-    stream = sys.stderr if args.json else sys.stdout
-    print(f"{passed} of {len(checks)} checks ok, {seconds:.1f} s", file=stream)
-    return 0 if passed == len(checks) else 1
-
-
-def _check(args: Args) -> None:
-    for name, least in (("moves", 1), ("episodes", 1), ("configurations", 1), ("seed", 0)):
-        if getattr(args, name) < least:
-            raise InputError(name, getattr(args, name), f"a whole number, at least {least}")
-    if not args.exchange or min(args.exchange) <= 0.0:
-        raise InputError("exchange", args.exchange, "numbers above 0, at least one")
+    results = {"summary": rows, "outcomes": [asdict(outcome) for outcome in outcomes]}
+    show = partial(_print, args, outcomes, rows)
+    return finish("transfer", args, checks, results, show, begun=begun)
 
 
 def _run_all(args: Args) -> list[TransferOutcome]:
     """Runs one configuration after the other, each with a generator of its own."""
-    import numpy as np
-    from hose_learning.transfer import TransferPlan, run_trial
-
-    from hose_mj.cli.progress import show_progress
-    from hose_mj.jit import compile_notice
-
     options = read_options(args.set, ("source", "target"))
     plan = TransferPlan(
         source=args.source,
@@ -118,7 +98,6 @@ def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> l
     One row for each greedy episode (the goal was reached in it for the first time), one for any of
     them, one for the greedy policy on the source, one for each control.
     """
-    from hose_learning.study.statistics import compute_rate_interval
 
     def first(outcome: TransferOutcome) -> int | None:
         return outcome.reached.index(True) if any(outcome.reached) else None
@@ -145,18 +124,13 @@ def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> l
 
 
 def _print(args: Args, outcomes: list[TransferOutcome], rows: list[dict[str, Any]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=f"{args.source} to {args.target}: {', '.join(outcomes[0].modules)}")
-    table.add_column("goal reached")
-    table.add_column("configurations", justify="right")
-    table.add_column("95 % interval", justify="right")
-    for row in rows:
-        low, high = (100 * bound for bound in row["interval"])
-        share = f"{row['reached']} of {row['of']}"
-        table.add_row(row["what"], share, f"{low:.0f} to {high:.0f} %")
-    Console().print(table)
+    title = f"{args.source} to {args.target}: {', '.join(outcomes[0].modules)}"
+    cells = [
+        (row["what"], f"{row['reached']} of {row['of']}", f"{100 * low:.0f} to {100 * high:.0f} %")
+        for row in rows
+        for low, high in (row["interval"],)
+    ]
+    print_table(title, ("goal reached", ">configurations", ">95 % interval"), cells)
     new = sum(o.vetoes_after - o.vetoes_before for o in outcomes)
     kept = sum(o.vetoes_before for o in outcomes)
     print(f"vetoes: {kept:,} transferred, {new:,} added on the target")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -33,10 +33,10 @@ def run(args: Args) -> int:
 
     recording = find_recording(args.file)
     outcomes = read_outcomes(recording)
-    broke_at = find_break_time(outcomes)
+    broke_at = [one["break_time"] for one in outcomes.values() if "break_time" in one]
     at_s = args.at
-    if at_s is None and broke_at is not None:
-        at_s = broke_at + 1e-6  # just after, whatever the clock is rounded to
+    if at_s is None and broke_at:
+        at_s = min(broke_at) + 1e-6  # just after, whatever the clock is rounded to
     for name, outcome in outcomes.items():
         text = outcome.get("break_text", f"ended by {outcome['ended_by']}")
         print(f"{recording.name}, {name}: {text}", file=sys.stderr)
@@ -46,25 +46,15 @@ def run(args: Args) -> int:
     else:
         open_recording(recording, at_s)
     if args.json:
-        results = {"recording": recording, "at": at_s, "episodes": list_episodes(outcomes)}
+        episodes = [
+            {
+                "model": name,
+                "ended_by": outcome["ended_by"],
+                "break_kind": outcome.get("break_kind"),
+                "break_time": outcome.get("break_time"),
+            }
+            for name, outcome in outcomes.items()
+        ]
+        results = {"recording": recording, "at": at_s, "episodes": episodes}
         print_document(make_document("view", args, results=results))
     return 0
-
-
-def find_break_time(outcomes: dict[str, dict[str, Any]]) -> float | None:
-    """Returns when the first constraint broke (s); None if none did."""
-    times = [one["break_time"] for one in outcomes.values() if "break_time" in one]
-    return min(times, default=None)
-
-
-def list_episodes(outcomes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
-    """Returns one record for each episode, with null where nothing broke."""
-    return [
-        {
-            "model": name,
-            "ended_by": outcome["ended_by"],
-            "break_kind": outcome.get("break_kind"),
-            "break_time": outcome.get("break_time"),
-        }
-        for name, outcome in outcomes.items()
-    ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 import tyro
 
 from hose_mj.cli.progress import show_progress
+from hose_mj.cli.results import check_choice
 from hose_mj.errors import InputError
 from hose_mj.recording.document import make_document, print_document
 
@@ -40,8 +40,7 @@ class Args:
 def run(args: Args) -> int:
     """Runs a little of everything; 0 when done."""
     for group in args.groups:
-        if group not in GROUPS:
-            raise InputError("group", group, f"of {', '.join(GROUPS)}")
+        check_choice("group", group, GROUPS)
     jobs = {f"{g}: {n}": job for g in args.groups or GROUPS for n, job in GROUPS[g]().items()}
     from hose_mj.jit import count_compiled
 
@@ -62,37 +61,38 @@ def run(args: Args) -> int:
         for record in records:
             if record["compiled"]:
                 print(f"{record['name']}: {record['compiled']} compiled, {record['wall_s']:.1f} s")
-        print(f"{total} kernels compiled, {wall_s:.1f} s", file=sys.stdout)
+        print(f"{total} kernels compiled, {wall_s:.1f} s")
     return 0
 
 
 def list_hose_jobs() -> dict[str, Job]:
     """Hoses in a plane and in space, with every scheme, form of twist and kind of contact."""
-    jobs: dict[str, Job] = {}
-    for plane in ("xz", None):
-        where = "in space" if plane is None else "in a plane"
-        for scheme in SCHEMES:
-            jobs[f"{where}, {scheme}"] = partial(_use_hose, plane=plane, scheme=scheme)
+    jobs: dict[str, Job] = {
+        f"{where}, {scheme}": partial(_use_hose, plane=plane, scheme=scheme)
+        for plane, where in (("xz", "in a plane"), (None, "in space"))
+        for scheme in SCHEMES
+    }
     jobs["in space, an angle at every control point"] = partial(_use_hose, twist="theta")
     jobs["in a plane, verlet"] = _use_verlet
     return jobs
 
 
-def _make_spec() -> Any:
+def _make_hose(**options: Any) -> Any:
+    from hose_mj.hoses.registry import make_hose
     from hose_mj.hoses.spec import HoseSpec
 
-    return HoseSpec.from_material(
+    spec = HoseSpec.from_material(
         length=1.0, youngs_modulus=1e6, poisson_ratio=0.45, density=1000.0, outer_radius=0.005
     )
+    hose = make_hose("geds", spec, control_points=8, **options)
+    hose.reset([[0, 0, 1], [1, 0, 1]])
+    hose.clamp(0.0)
+    return hose
 
 
 def _use_hose(**options: Any) -> None:
     """Everything that a hose is asked for, once."""
-    from hose_mj.hoses.registry import make_hose
-
-    hose: Any = make_hose("geds", _make_spec(), timestep=0.002, control_points=8, **options)
-    hose.reset([[0, 0, 1], [1, 0, 1]])
-    hose.clamp(0.0)
+    hose = _make_hose(timestep=0.002, **options)
     hold = hose.attach(1.0)
     hose.step(2)
     hose.move(hold, (0.999, 0.0, 1.0))
@@ -107,13 +107,7 @@ def _use_hose(**options: Any) -> None:
 
 
 def _use_verlet() -> None:
-    from hose_mj.hoses.registry import make_hose
-
-    options = {"timestep": 1e-5, "control_points": 8, "plane": "xz", "scheme": "verlet"}
-    hose: Any = make_hose("geds", _make_spec(), **options)
-    hose.reset([[0, 0, 1], [1, 0, 1]])
-    hose.clamp(0.0)
-    hose.step(2)
+    _make_hose(timestep=1e-5, plane="xz", scheme="verlet").step(2)
 
 
 def list_world_jobs() -> dict[str, Job]:
@@ -131,10 +125,8 @@ def _use_world(scene: str) -> None:
     from hose_mj.rollout.policies import make_policy
     from hose_mj.world.registry import make_world
 
-    world = make_world(scene)
-    generator = np.random.default_rng(0)
-    policy = make_policy("random")
-    run_episode(world, Monitor(world), policy, duration=0.05, generator=generator)
+    world, generator = make_world(scene), np.random.default_rng(0)
+    run_episode(world, Monitor(world), make_policy("random"), duration=0.05, generator=generator)
 
 
 def list_learn_jobs() -> dict[str, Job]:

@@ -275,8 +275,13 @@ def _format_row(tag: str, cells: Sequence[str], right: Sequence[bool]) -> str:
 
 def format_checks(checks: Sequence[Check]) -> str:
     """Returns the failed checks as a list, and all of them as small tables side by side."""
-    failed = [check for check in checks if not check.ok]
-    above = f'<ul class="checks">{"".join(map(_format_failed, failed))}</ul>' if failed else ""
+    failed = "".join(
+        f'<li>{_BAD}<span>{format_text(check.name)}</span><span class="detail">'
+        f"{format_text(f'{format_value(check.value)}, limit {_format_limit(check)}')}</span></li>\n"
+        for check in checks
+        if not check.ok
+    )
+    above = f'<ul class="checks">{failed}</ul>' if failed else ""
     groups = [_format_group(heading, some) for heading, some in group_checks(checks).items()]
     kind = "groups one" if len(groups) == 1 else "groups"
     return f'{above}<div class="{kind}">{"".join(groups)}</div>'
@@ -309,15 +314,6 @@ def _split(name: str) -> tuple[str, str]:
         head, _, tail = name.rpartition(", ")
         head, tail = (head, tail) if head else (tail, "")
     return head, tail
-
-
-def _format_failed(check: Check) -> str:
-    """Returns one line with everything about a check."""
-    detail = f"{format_value(check.value)}, limit {_format_limit(check)}"
-    return (
-        f"<li>{_BAD}<span>{format_text(check.name)}</span>"
-        f'<span class="detail">{format_text(detail)}</span></li>\n'
-    )
 
 
 def _format_group(heading: str, members: Sequence[tuple[str, Check]]) -> str:

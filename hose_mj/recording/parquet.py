@@ -54,7 +54,10 @@ def write_records(
     Raises:
         InputError: a value or a mixture of types that no column can hold.
     """
-    rows = [{str(key): _to_plain(value) for key, value in record.items()} for record in records]
+    rows = [
+        {str(k): v.item() if isinstance(v, np.generic) else v for k, v in record.items()}
+        for record in records
+    ]
     table = make_table(rows, dict(types or {}), dict(metadata or {}))
     _write_parquet(table, parquet_path)
     if csv_path is not None:
@@ -97,9 +100,8 @@ def make_table(rows: list[Record], types: dict[str, type], metadata: dict[str, s
     for name in names:
         values = [row.get(name) for row in rows]
         kind = find_type(name, values, types.get(name))
-        columns[name] = pa.array(
-            [None if value is None else kind(value) for value in values], _ARROW_TYPES[kind]
-        )
+        plain = [None if value is None else kind(value) for value in values]
+        columns[name] = pa.array(plain, _ARROW_TYPES[kind])
     return pa.table(columns).replace_schema_metadata(metadata)
 
 
@@ -126,7 +128,3 @@ def _write_parquet(table: Any, path: Path) -> None:
     sink = pa.BufferOutputStream()
     pa.parquet.write_table(table, sink, compression="zstd")
     write_atomically(Path(path), sink.getvalue().to_pybytes())
-
-
-def _to_plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

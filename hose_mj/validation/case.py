@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -129,6 +132,27 @@ class Case:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "family", self.family or self.id)
+
+
+@cache
+def read_texts() -> dict[str, dict[str, str]]:
+    """Reads the words of our cases: `title`, `about`, perhaps `prefix`, by family or id."""
+    return tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))
+
+
+def make_case(family: str, parameter: str = "", **facts: Any) -> Case:
+    """Makes one of the cases whose words stand in cases.toml, under its id or its family.
+
+    Args:
+        family: of the case.
+        parameter: stands behind the family in its id, and in its title; "" where it is alone.
+        facts: what else makes a `Case`.
+    """
+    texts = read_texts()
+    text = texts.get(f"{family}-{parameter}") or texts[family]
+    id = f"{family}-{text.get('prefix', '')}{parameter}" if parameter else family
+    title = text["title"].format(parameter)
+    return Case(id=id, title=title, about=text["about"], family=family, **facts)
 
 
 def lay_straight(hose: HoseModel) -> None:

@@ -20,7 +20,7 @@ from hose_mj.validation.run import (
     run_static,
     time_rounds,
 )
-from hose_mj.validation.settings import Grid, list_ladders
+from hose_mj.validation.settings import Grid, Setting, list_ladders
 
 INEXTENSIBLE = tuple(model for model, entry in MODELS.items() if not entry.stretches)
 
@@ -107,9 +107,8 @@ def compute_limit_gap(result: CaseResult) -> float | None:
     finest: dict[int, RunResult] = {}
     for outcome in result.outcomes:
         setting = outcome.setting
-        if setting.model != "hinge-chain" or setting.scheme != "rk4":
-            continue
-        if setting.clamp_corrected is False:
+        kind = (setting.model, setting.scheme)
+        if kind != ("hinge-chain", "rk4") or setting.clamp_corrected is False:
             continue
         best = finest.get(setting.resolution)
         assert setting.timestep is not None
@@ -156,18 +155,9 @@ def compute_ratios(result: CaseResult, levels: Sequence[float] = EQUAL_ERRORS) -
                 theirs = find_cheapest(result.outcomes, against, at_error)
                 if ours is None or theirs is None:
                     continue
-                ratios.append(
-                    Ratio(
-                        result.case.id,
-                        at_error,
-                        "geds",
-                        against,
-                        planar,
-                        theirs.wall_s / ours.wall_s,
-                        ours.setting.label,
-                        theirs.setting.label,
-                    )
-                )
+                what = (result.case.id, at_error, "geds", against, planar)
+                labels = (ours.setting.label, theirs.setting.label)
+                ratios.append(Ratio(*what, theirs.wall_s / ours.wall_s, *labels))
     return ratios
 
 
@@ -204,22 +194,15 @@ def check_motions(result: CaseResult) -> list[Check]:
     if result.limit_gap is not None:
         text = f"{case_id}: MuJoCo's Richardson limit differs from the reference by (of L)"
         checks.append(Check(text, result.limit_gap, 1e-3))
-    if result.case.promise is not None:
-        checks += _check_promise(result, result.case.promise)
+    ours = [o for o in result.outcomes if o.setting.model == "geds"]
+    if result.case.promise is not None and ours:
+        finest = max(outcome.setting.resolution for outcome in ours)
+        error = min(outcome.error for outcome in ours if outcome.setting.resolution == finest)
+        text = f"{case_id}: error of GEDS with {finest} control points (of L)"
+        checks.append(Check(text, error, result.case.promise))
     if case_id == "released-rod":
         checks += _check_released_rod(result)
     return checks
-
-
-def _check_promise(result: CaseResult, promise: float) -> list[Check]:
-    """The error of GEDS with the most control points run, at its best time step."""
-    ours = [o for o in result.outcomes if o.setting.model == "geds"]
-    if not ours:
-        return []
-    finest = max(outcome.setting.resolution for outcome in ours)
-    error = min(outcome.error for outcome in ours if outcome.setting.resolution == finest)
-    text = f"{result.case.id}: error of GEDS with {finest} control points (of L)"
-    return [Check(text, error, promise)]
 
 
 _PROMISED = {
@@ -234,14 +217,9 @@ _PROMISED = {
 def _check_released_rod(result: CaseResult) -> list[Check]:
     checks = []
     for points, step, limit in ((8, 0.005, 0.01), (12, 0.0025, 0.0015)):
-        for outcome in result.outcomes:
-            setting = outcome.setting
-            place = (setting.model, setting.scheme, setting.resolution, setting.timestep)
-            if place == ("geds", "bdf2", points, step):
-                text = (
-                    f"released-rod: tip error, {points} control points at {1e3 * step:g} ms (of L)"
-                )
-                checks.append(Check(text, outcome.error, limit))
+        wanted = Setting("geds", "bdf2", points, None, step)
+        text = f"released-rod: tip error, {points} control points at {1e3 * step:g} ms (of L)"
+        checks += [Check(text, o.error, limit) for o in result.outcomes if o.setting == wanted]
     for ratio in compute_ratios(result):
         # Like against like: the cable moves in space, the hinge chain in a plane.
         promised = _PROMISED.get((ratio.against, ratio.at_error))

@@ -25,6 +25,7 @@ from hose_mj.validation.case import (
     Reference,
     lay_between,
     lay_cantilever,
+    make_case,
     read_places,
     read_tip,
 )
@@ -33,7 +34,7 @@ from hose_mj.validation.quasistatic import WIDTH, Chain, settle
 ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 """Turns a cylinder's axis to y, across the plane in which hoses are laid."""
 
-_MOTION = partial(Case, gravity=DOWN, scale=LENGTH)
+_MOTION = partial(make_case, gravity=DOWN, scale=LENGTH)
 
 
 def _ease(time: float, ramp: float) -> float:
@@ -44,10 +45,7 @@ def _ease(time: float, ramp: float) -> float:
 def make_released_rod() -> Case:
     """A horizontal cantilever let go."""
     return _MOTION(
-        id="released-rod",
-        title="Released rod: a horizontal cantilever let go",
-        about="A straight horizontal cantilever is let go and swings for a second under gravity. "
-        "Compared: the place of the tip, largest distance over the second.",
+        "released-rod",
         spec=ROD,
         lay=lay_cantilever,
         probe=read_tip,
@@ -71,11 +69,8 @@ def make_free_flight() -> Case:
         hose.reset([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]], speed)
         return []
 
-    return Case(
-        id="free-flight",
-        title="Free flight: a straight hose thrown spinning and flexing, without gravity",
-        about="A straight hose is thrown at .5 m/s with a spin of 4 rad/s and a smooth flexing "
-        "motion on top. Compared: the places of both ends and the middle.",
+    return make_case(
+        "free-flight",
         spec=ROD,
         lay=lay,
         probe=read_places((0.0, 0.5, 1.0)),
@@ -92,11 +87,8 @@ def make_taut_pull() -> Case:
         hose.move(holds[1], (slack + (taut - slack) * _ease(time, ramp), 0.0, 0.0))
 
     return _MOTION(
-        id="taut-pull-hose",
-        family="taut-pull",
-        title="Taut pull: two ends moved apart until the hose is taut, then held",
-        about="A sagging hose is let go between two attachments; one is drawn away from .8 to "
-        ".995 L within a second and held for another. Compared: the places of the quarter points.",
+        "taut-pull",
+        "hose",
         spec=replace(ROD, damping_time=0.01),
         lay=lambda hose: lay_between(hose, slack),
         probe=read_places((0.25, 0.5, 0.75)),
@@ -125,12 +117,9 @@ def make_suture_pull() -> Case:
         aim = np.array([0.5 * slack, 0.0, pull])
         hose.move(holds[2], starts[hose] + (aim - starts[hose]) * _ease(time, ramp))
 
-    return Case(
-        id="taut-pull-suture",
-        family="taut-pull",
-        title="Taut pull: a suture thread drawn sideways at its middle",
-        about="10 cm of thread, radius .2 mm, E = 750 MPa, both ends held 98 mm apart; its middle "
-        "is drawn sideways until taut, then held. Compared: the places of the quarter points.",
+    return make_case(
+        "taut-pull",
+        "suture",
         spec=HoseSpec.from_material(
             length=length,
             youngs_modulus=750e6,
@@ -184,12 +173,8 @@ def make_capstan() -> Case:
             pulls.append(-hose.reaction(hold).force[2])
         return np.array([np.mean(pulls[n_steps // 2 :]) / pull])
 
-    return Case(
-        id="capstan",
-        title="Capstan: a hose drawn over half a drum",
-        about="A weightless hose lies over half a drum; one end is pulled with 1 N, the other "
-        "drawn away at 5 cm/s. Compared: the ratio of the two pulls, mean of the second half of "
-        "1.5 s, with Euler's and Eytelwein's exp(mu theta), mu = .3, theta = pi.",
+    return make_case(
+        "capstan",
         spec=spec,
         lay=lay,
         probe=probe,
@@ -304,12 +289,7 @@ def make_floor_tow() -> Case:
         hose.move(holds[0], (*compute_tow_place(np.array(time / TOW_TIME)), height))
 
     return _MOTION(
-        id="floor-tow",
-        title="Floor tow: a hose towed slowly along a figure of eight",
-        about="A hose on a rough floor, mu = .5, is towed by one end along a figure of eight, 3 "
-        "cm/s. Compared: the places of eleven points, with a chain that minimises its energy and "
-        "the work of friction increment by increment. The segments of MuJoCo's cable are round "
-        "and roll sideways over the floor; that gap stays whatever their number.",
+        "floor-tow",
         spec=_TOWED,
         lay=lay,
         probe=read_places(np.linspace(0.0, 1.0, 11)),
@@ -332,11 +312,7 @@ def make_obstacle_drop() -> Case:
         kind="cylinder", position=(0.5, 0.0, -0.3), rotation=ACROSS, size=(0.1, 0.2), friction=0.3
     )
     return _MOTION(
-        id="obstacle-drop",
-        title="Obstacle drop: a horizontal cantilever let go above a bar",
-        about="A straight horizontal cantilever is let go, falls onto a round bar, mu = .3, and "
-        "whips around it. Compared: the places of the middle, three quarters and the tip. GEDS "
-        "converges to its own contact law; MuJoCo's soft contacts are another.",
+        "obstacle-drop",
         spec=replace(
             ROD, bending_stiffness=0.02, torsional_stiffness=0.02 / 1.3, damping_time=0.02
         ),

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +18,8 @@ from hose_mj.checks import Check
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.mujoco.flex import FlexHose
 from hose_mj.hoses.protocol import Array, Hold
-from hose_mj.validation import reference
+from hose_mj.validation import motions, random_states, reference, statics
 from hose_mj.validation.case import LENGTH, ROD, STOUT, Case, lay_straight
-from hose_mj.validation.cases import find_cases
 from hose_mj.validation.modes import compute_frequencies
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import Setting
@@ -43,23 +43,18 @@ def measure_order(sizes: list[float], errors: list[float]) -> float:
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
 
 
-def _find(case_id: str) -> Case:
-    return find_cases((case_id,))[0]
-
-
 def check_frequency_order() -> tuple[list[Check], Curves]:
     """Order of the first three frequencies in the span length, worst of three kinds of ends.
 
     Bending of a straight hose knows nothing of EA; the smaller one leaves less rounding error.
     """
-    spec = ROD
-    unit = np.sqrt(spec.bending_stiffness / (spec.linear_density * spec.length**4))
+    unit = np.sqrt(ROD.bending_stiffness / (ROD.linear_density * ROD.length**4))
     points = (8, 10, 12, 16, 20)
-    spans = [spec.length / (n - 3) for n in points]
+    spans = [ROD.length / (n - 3) for n in points]
     orders: list[float] = []
     curves: Curves = {}
     for ends in ("clamped-free", "free-free", "clamped-pinned"):
-        case = replace(_find(f"frequencies-{ends}"), spec=spec)
+        case = replace(statics.make_frequencies(ends), spec=ROD)
         truth = reference.beam_frequencies(ends)
         errors = []
         for n in points:
@@ -76,7 +71,7 @@ def check_frequency_order() -> tuple[list[Check], Curves]:
 
 def check_swing_order() -> tuple[list[Check], Curves]:
     """Order of the released rod's tip in the span length, at one fine time step."""
-    case = _find("released-rod")
+    case = motions.make_released_rod()
     step = 0.02 / 128
 
     def swing(n: int) -> Array:
@@ -94,7 +89,7 @@ def check_swing_order() -> tuple[list[Check], Curves]:
 
 def check_time_order() -> tuple[list[Check], Curves]:
     """Order in the time step of every implicit scheme, on a released rod that starts smoothly."""
-    case = _find("taut-pull-hose")
+    case = motions.make_taut_pull()
     assert case.motion is not None
     case = replace(case, motion=replace(case.motion, duration=0.4, n_samples=10, drive=None))
     steps = [0.004 / 2**k for k in range(4)]
@@ -116,22 +111,16 @@ def check_time_order() -> tuple[list[Check], Curves]:
 
 def check_momenta() -> list[Check]:
     """Linear and angular momentum of the free flight in every scheme."""
-    case = _find("free-flight")
+    case = motions.make_free_flight()
     assert case.motion is not None
     checks = []
     for scheme in ("bdf2", "backward-euler", "sdirk2", "midpoint", "verlet"):
         steps = [2e-5] if scheme == "verlet" else [0.0025, 0.00125, 0.000625]
         angular = []
         for step in steps:
-            hose = GedsHose(
-                case.spec,
-                timestep=step,
-                gravity=case.gravity,
-                control_points=12,
-                scheme=scheme,
-                tolerance=1e-12,
-                max_iterations=50,
-            )
+            options: dict[str, Any] = {"scheme": scheme, "tolerance": 1e-12, "max_iterations": 50}
+            options |= {"timestep": step, "gravity": case.gravity, "control_points": 12}
+            hose = GedsHose(case.spec, **options)
             case.lay(hose)
             before = hose.momentum()
             hose.step(round(0.5 / step))
@@ -140,20 +129,18 @@ def check_momenta() -> list[Check]:
             turn = np.linalg.norm(after.angular - before.angular) / np.linalg.norm(before.angular)
             angular.append(float(turn))
         checks.append(Check(f"drift of linear momentum, {scheme}", float(linear), 1e-9))
+        name = f"drift of angular momentum, {scheme}"
         if scheme in ("midpoint", "verlet"):
-            checks.append(Check(f"drift of angular momentum, {scheme}", angular[-1], 1e-9))
+            checks.append(Check(name, angular[-1], 1e-9))
         else:
             least = 0.9 if scheme == "backward-euler" else 1.9
-            order = measure_order(steps, angular)
-            checks.append(
-                Check(f"order of the drift of angular momentum, {scheme}", order, least, ">=")
-            )
+            checks.append(Check(f"order of the {name}", measure_order(steps, angular), least, ">="))
     return checks
 
 
 def check_energy() -> tuple[list[Check], tuple[list[float], list[float]]]:
     """Energy of the released rod over ten seconds at 5 ms with BDF2, against its start."""
-    case = _find("released-rod")
+    case = motions.make_released_rod()
     hose = GedsHose(case.spec, timestep=0.005, gravity=case.gravity, control_points=12)
     case.lay(hose)
     # The start, measured from the lowest state there is: hanging straight down.
@@ -173,9 +160,13 @@ def check_cost() -> tuple[list[Check], Curves]:
     """Cost of a step over the number of control points, in a plane and in space."""
     points = (16, 32, 64, 128, 256)
     sizes = [float(n) for n in points]
-    least = _time_steps(
-        {(plane, n): _make_swinging(plane, n) for plane in (None, "xz") for n in points}, rounds=7
-    )
+    hoses: dict[Kind, GedsHose] = {}
+    for plane in (None, "xz"):
+        for n in points:  # released rods, warmed up; one Newton iteration a step at this time step
+            hose = hoses[plane, n] = GedsHose(ROD, timestep=2e-4, control_points=n, plane=plane)
+            hose.clamp(0.0)
+            hose.step(50)
+    least = _time_steps(hoses, rounds=7)
     checks: list[Check] = []
     curves: Curves = {}
     for plane, name in ((None, "in space"), ("xz", "in a plane")):
@@ -199,17 +190,9 @@ def _time_steps(hoses: Mapping[Kind, GedsHose], rounds: int) -> dict[Kind, float
     return least
 
 
-def _make_swinging(plane: str | None, n: int) -> GedsHose:
-    """A released rod, warmed up; one Newton iteration a step at this time step."""
-    hose = GedsHose(ROD, timestep=2e-4, control_points=n, plane=plane)
-    hose.clamp(0.0)
-    hose.step(50)
-    return hose
-
-
 def check_suture() -> list[Check]:
     """The suture thread pulled taut at 1 ms: that it works, and how hard the solver has it."""
-    case = _find("taut-pull-suture")
+    case = motions.make_suture_pull()
     assert case.motion is not None
     setting = Setting("geds", "bdf2", 24, None, 0.001)
     hose = setting.make(case)
@@ -234,9 +217,7 @@ def check_random_states(
         rng: draws them.
         advance: called with the number done, now and then.
     """
-    from hose_mj.validation.random_states import run_random_states
-
-    tally = run_random_states(n_states, rng, advance)
+    tally = random_states.run_random_states(n_states, rng, advance)
     return [
         Check(f"random states with a NaN, of {n_states}", float(tally.not_finite), 0.0),
         Check("random states that end in a verdict", tally.verdicts / n_states, 0.01, "<"),
@@ -261,9 +242,8 @@ def check_turns() -> list[Check]:
             hose.step()
         hose.step(400)
         error = abs(float(hose.torque(0.5 * LENGTH)[0]) / moment - 1.0)
-        checks.append(
-            Check(f"27 turns, 40 degrees a step, {form}: error of the torque", error, 1e-9)
-        )
+        name = f"27 turns, 40 degrees a step, {form}: error of the torque"
+        checks.append(Check(name, error, 1e-9))
     return checks
 
 
@@ -287,10 +267,9 @@ def precess(form: str, n_turns: int, steps_a_turn: int = 36) -> Iterator[GedsHos
 
     Yields the hose at equilibrium before it begins, then after every turn.
     """
+    options: dict[str, Any] = {"gravity": (0, 0, 0), "twist": form, "tolerance": 1e-9}
     spec = replace(ROD, damping_time=0.1)
-    hose = GedsHose(
-        spec, timestep=0.02, gravity=(0, 0, 0), control_points=16, twist=form, tolerance=1e-9
-    )
+    hose = GedsHose(spec, timestep=0.02, control_points=16, **options)
     bend = 1.2
     hose.reset(
         lambda s: np.stack([np.sin(bend * s) / bend, (1 - np.cos(bend * s)) / bend, 0 * s], axis=1)
@@ -330,16 +309,15 @@ def check_precession() -> list[Check]:
 def check_agreement() -> list[Check]:
     """Both forms on the localized helix with 100 control points, and on the largest ring."""
     checks = []
-    for name, n, limit in (("helix", 100, 3e-3), ("ring-twist-1", 24, 3e-3)):
-        case = _find(name)
+    for case, n in ((statics.make_helix(), 100), (statics.make_ring(1.0), 24)):
         found = []
         for form in FORMS:
             hose = Setting("geds", "statics", n).make(case, twist=form)
             case.lay(hose)
             found.append(case.probe(hose))
         gap = float(np.max(np.abs(found[1] / found[0] - 1.0)))
-        text = f"{name} with {n} control points: theta differs from scalar twist by"
-        checks.append(Check(text, gap, limit))
+        text = f"{case.id} with {n} control points: theta differs from scalar twist by"
+        checks.append(Check(text, gap, 3e-3))
     return checks
 
 
@@ -348,12 +326,9 @@ def check_twist_cost() -> tuple[list[Check], Curves]:
     points = (16, 32, 64, 128)
     sizes = [float(n) for n in points]
     names = {"plain": "without twist", "scalar": "scalar twist", "theta": "theta"}
-    least = _time_steps(
-        {(form, n): _make_twisted(form, n) for form in names for n in points}, rounds=15
-    )
-    curves: Curves = {
-        name: (sizes, [least[form, n] for n in points]) for form, name in names.items()
-    }
+    kinds: list[Kind] = [(form, n) for form in names for n in points]
+    least = _time_steps({kind: _make_twisted(*kind) for kind in kinds}, rounds=15)
+    curves: Curves = {k: (sizes, [least[form, n] for n in points]) for form, k in names.items()}
     checks: list[Check] = []
     for form, limit in (("scalar", 1.4), ("theta", 2.0)):
         ratio = max(least[form, n] / least["plain", n] for n in points)
@@ -364,7 +339,7 @@ def check_twist_cost() -> tuple[list[Check], Curves]:
     return checks, curves
 
 
-def _make_twisted(form: str, n: int) -> GedsHose:
+def _make_twisted(form: str | None, n: int) -> GedsHose:
     """A straight rod under tension between two clamps, with some twist."""
     spec = replace(ROD, torsional_stiffness=0.0) if form == "plain" else ROD
     twist = None if form == "plain" else form
@@ -394,7 +369,7 @@ def measure_stretch(case: Case, timestep: float) -> float:
 
 def check_flex_stretch() -> list[Check]:
     """Stretch of the released rod's edges, and how it falls with the time step."""
-    case = _find(FLEX_CASE)
+    case = motions.make_released_rod()
     stretches = [measure_stretch(case, step) for step in FLEX_STEPS]
     order = measure_order(list(FLEX_STEPS), stretches)
     name = f"flex, {FLEX_SEGMENTS} segments: residual stretch of the released rod"

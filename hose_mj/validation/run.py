@@ -130,18 +130,9 @@ def score_static(case: Case, setting: Setting, reference: Reference | None = Non
     else:
         assert case.scale is not None
         error = compute_distance(values[None], reference.values) / case.scale
-    return RunResult(
-        case.id,
-        setting,
-        error,
-        "closed form" if reference is None else "converged",
-        wall,
-        None,
-        _count_fallbacks(hose),
-        np.zeros(1),
-        hose.position(_drawn(case))[None],
-        values[None],
-    )
+    kind = "closed form" if reference is None else "converged"
+    seen = (np.zeros(1), hose.position(_drawn(case))[None], values[None])
+    return RunResult(case.id, setting, error, kind, wall, None, _count_fallbacks(hose), *seen)
 
 
 def simulate(case: Case, hose: HoseModel) -> tuple[Array, Array, Array, float]:
@@ -223,7 +214,9 @@ def run_ladder(
         if setting.model != "geds" and outcomes:
             flex = setting.model == "flex"
             most = grid.longest_flex_ladder if flex else grid.longest_ladder
-            if _is_exhausted(outcomes) or len(outcomes) == most:
+            last_two = [outcome.error for outcome in outcomes[-2:]]
+            stagnates = len(last_two) == 2 and last_two[1] > (1.0 - STAGNATION) * last_two[0]
+            if stagnates or len(outcomes) == most:
                 break
             last = outcomes[-1].setting.timestep
             assert setting.timestep is not None
@@ -247,11 +240,6 @@ def run_ladder(
     return outcomes, skipped
 
 
-def _is_exhausted(outcomes: list[RunResult]) -> bool:
-    """True once the last halving of the time step took less than STAGNATION off the error."""
-    return len(outcomes) >= 2 and outcomes[-1].error > (1.0 - STAGNATION) * outcomes[-2].error
-
-
 def _score(case: Case, setting: Setting, reference: Reference) -> RunResult | None:
     """One run against the reference; None where it was unstable."""
     assert case.motion is not None
@@ -265,18 +253,8 @@ def _score(case: Case, setting: Setting, reference: Reference) -> RunResult | No
     may_be_far = setting.model == "geds" or not case.has_ratios
     if not (error < LOST or (may_be_far and np.isfinite(error))):
         return None
-    return RunResult(
-        case.id,
-        setting,
-        error,
-        "converged",
-        wall,
-        case.motion.duration,
-        _count_fallbacks(hose),
-        times,
-        points,
-        values,
-    )
+    took = (wall, case.motion.duration, _count_fallbacks(hose))
+    return RunResult(case.id, setting, error, "converged", *took, times, points, values)
 
 
 def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:
@@ -305,25 +283,16 @@ def time_rounds(
 
     No run starts after `until`, a reading of `time.perf_counter`.
     """
-    contenders = [
-        outcome
-        for kind in dict.fromkeys(map(_kind, outcomes))
-        for at_error in levels
-        for outcome in _choose_fastest(outcomes, kind, at_error)
-    ]
-    contenders = list({id(outcome): outcome for outcome in contenders}.values())
+    contenders: dict[int, RunResult] = {}
+    for kind in dict.fromkeys(map(_kind, outcomes)):
+        for at_error in levels:
+            fits = [o for o in outcomes if _kind(o) == kind and o.error <= at_error]
+            fits.sort(key=lambda outcome: outcome.wall_s)
+            contenders |= {id(outcome): outcome for outcome in fits[:N_CONTENDERS]}
     for _ in range(grid.rounds):
-        for outcome in contenders:
+        for outcome in contenders.values():
             if outcome.wall_s < grid.longest_timed_run and time.perf_counter() < until:
                 outcome.wall_s = min(outcome.wall_s, time_run(case, outcome.setting.make(case)))
-
-
-def _choose_fastest(
-    outcomes: list[RunResult], kind: tuple[str, bool, bool], at_error: float
-) -> list[RunResult]:
-    """The few fastest of one kind with at most this error, as first timed."""
-    fits = [o for o in outcomes if _kind(o) == kind and o.error <= at_error]
-    return sorted(fits, key=lambda outcome: outcome.wall_s)[:N_CONTENDERS]
 
 
 def _kind(outcome: RunResult) -> tuple[str, bool, bool]:

@@ -122,18 +122,12 @@ _SCHEMES = {
     model: (*entry.schemes, *(f"{scheme}, planar" for scheme in entry.schemes if entry.plane))
     for model, entry in MODELS.items()
 }
+_CHAINS = ("cable", "flex", "hinge-chain")
 FULL = Grid(
-    static={
-        "geds": (8, 12, 16, 20),
-        "cable": (10, 20, 40),
-        "flex": (10, 20, 40),
-        "hinge-chain": (10, 20, 40),
-    },
+    static={"geds": (8, 12, 16, 20), **dict.fromkeys(_CHAINS, (10, 20, 40))},
     dynamic={
         "geds": (8, 9, 10, 11, 12, 13, 14, 16, 20, 24, 32),
-        "cable": (10, 15, 20, 30, 40, 60, 80, 120, 160),
-        "flex": (10, 15, 20, 30, 40, 60, 80, 120, 160),
-        "hinge-chain": (10, 15, 20, 30, 40, 60, 80, 120, 160),
+        **dict.fromkeys(_CHAINS, (10, 15, 20, 30, 40, 60, 80, 120, 160)),
     },
     schemes=_SCHEMES,
     smallest_geds_step=0.0,
@@ -146,12 +140,7 @@ FULL = Grid(
 )
 QUICK = Grid(
     static={"geds": (8, 12, 20), "cable": (20, 40), "flex": (20, 40), "hinge-chain": (20,)},
-    dynamic={
-        "geds": (8, 12, 13, 16),
-        "cable": (20, 40),
-        "flex": (20, 60),
-        "hinge-chain": (20, 40),
-    },
+    dynamic={"geds": (8, 12, 13, 16), **dict.fromkeys(_CHAINS, (20, 40)), "flex": (20, 60)},
     schemes=_SCHEMES | {"hinge-chain": ("euler", "rk4")},
     smallest_geds_step=0.9e-3,
     longest_ladder=3,

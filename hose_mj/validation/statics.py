@@ -30,6 +30,7 @@ from hose_mj.validation.case import (
     lay_free,
     lay_pinned,
     lay_straight,
+    make_case,
     read_tip,
 )
 from hose_mj.validation.modes import (
@@ -41,8 +42,8 @@ from hose_mj.validation.modes import (
 
 _HOLDS: WeakKeyDictionary[HoseModel, list[Hold]] = WeakKeyDictionary()
 """The holds of a case's hose, from `lay` for `probe`."""
-_CANTILEVER = partial(Case, spec=STOUT, lay=lay_cantilever, clamped=True)
-_IN_SPACE = partial(Case, planar=False, models=("geds",))
+_CANTILEVER = partial(make_case, spec=STOUT, lay=lay_cantilever, clamped=True)
+_IN_SPACE = partial(make_case, planar=False, models=("geds",))
 LARGEST_SPIN = 2.0
 """Clamps are spun by at most this at once, which models of rigid segments can follow (rad)."""
 
@@ -56,11 +57,8 @@ def make_heavy_cantilever(gamma: float) -> Case:
         return np.array([-z / x])
 
     return _CANTILEVER(
-        id=f"heavy-cantilever-gamma-{gamma:g}",
-        family="heavy-cantilever",
-        title=f"Heavy cantilever, Gamma = {gamma:g}",
-        about="A horizontal cantilever sags under its own weight, Gamma = rho A g L^3 / EI. "
-        "Compared: drop of the tip over its distance from the wall, with the elastica.",
+        "heavy-cantilever",
+        f"{gamma:g}",
         gravity=(0.0, 0.0, -gamma * BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**3)),
         probe=probe,
         truth=lambda: np.array([reference.heavy_cantilever(gamma)]),
@@ -77,11 +75,8 @@ def make_tip_load(alpha: float) -> Case:
         return np.array([LENGTH - x, -z])
 
     return _CANTILEVER(
-        id=f"tip-load-{alpha:g}",
-        family="tip-load",
-        title=f"Cantilever with a tip load, P L^2 / EI = {alpha:g}",
-        about="A weightless cantilever carries a transverse load at its tip. Compared: axial and "
-        "transverse displacement of the tip, with the elastica.",
+        "tip-load",
+        f"{alpha:g}",
         probe=probe,
         truth=lambda: np.array(reference.tip_load(alpha)) * LENGTH,
     )
@@ -97,11 +92,8 @@ def make_end_moment(turn: float, name: str) -> Case:
         return np.array([x, -z])
 
     return _CANTILEVER(
-        id=f"end-moment-{name}",
-        family="end-moment",
-        title=f"Cantilever rolled up by an end moment, M L / EI = {name}",
-        about="A moment at the tip bends a weightless cantilever into an arc of a circle, closed "
-        "at 2 pi. Compared: the place of the tip, as a fraction of the length.",
+        "end-moment",
+        name,
         probe=probe,
         truth=lambda: np.array(reference.end_moment(turn)) * LENGTH,
         scale=LENGTH,
@@ -123,12 +115,9 @@ def make_frequencies(ends: str) -> Case:
         found = compute_frequencies(hose.linearize(), 3, above=0.1 * UNIT_FREQUENCY)
         return np.asarray(found / UNIT_FREQUENCY)
 
-    return Case(
-        id=f"frequencies-{ends}",
-        family="frequencies",
-        title=f"First three bending frequencies, {ends}",
-        about="Small vibrations of a straight weightless hose. Compared: omega in units of "
-        "sqrt(EI / (rho A L^4)), with Euler and Bernoulli's beam.",
+    return make_case(
+        "frequencies",
+        ends,
         spec=STOUT,
         lay=lay,
         probe=probe,
@@ -149,11 +138,8 @@ def make_hanging_chain() -> Case:
         unit = math.sqrt(GRAVITY / LENGTH)
         return np.asarray(compute_frequencies(hose.linearize(), 3, above=0.1 * unit) / unit)
 
-    return Case(
-        id="hanging-chain",
-        title="First three frequencies of a hanging chain",
-        about="Small swings of a chain hung at one end. Compared: omega sqrt(L / g), with half the "
-        "zeros of the Bessel function J0.",
+    return make_case(
+        "hanging-chain",
         spec=CHAIN,
         gravity=DOWN,
         lay=lay,
@@ -176,11 +162,8 @@ def make_catenary() -> Case:
         pull = np.linalg.norm(hose.reaction(_HOLDS[hose][0]).force)
         return np.array([sag / LENGTH, pull / WEIGHT])
 
-    return Case(
-        id="catenary",
-        title="Catenary, length 1.5 times the span",
-        about="A chain hangs between two points of one height. Compared: sag over length and pull "
-        "on a support over weight, with the catenary.",
+    return make_case(
+        "catenary",
         spec=CHAIN,
         gravity=DOWN,
         lay=lay,
@@ -200,14 +183,9 @@ def make_euler_buckling(ends: str) -> Case:
         above = 0.1 * UNIT_FREQUENCY
         return np.array([compute_critical_load(unloaded, hose.linearize(), unit, above) / unit])
 
-    return Case(
-        id=f"euler-buckling-{ends}",
-        family="euler-buckling",
-        title=f"Euler's critical thrust, {ends}",
-        about="The thrust under which the straight state loses its stability, from the eigenvalues "
-        "of the tangent stiffness, unloaded and under a pull. Compared: P L^2 / EI. Pinned: one "
-        "end attached, the thrust on the other keeps its direction; load and shape are the pinned "
-        "column's.",
+    return make_case(
+        "euler-buckling",
+        ends,
         spec=STOUT,
         lay=lay_cantilever if ends == "clamped-free" else lay_pinned,
         probe=probe,
@@ -258,11 +236,8 @@ def make_bend(load: float) -> Case:
         return read_tip(hose)
 
     return _IN_SPACE(
-        id=f"bend-45-load-{load:g}",
-        family="bend-45",
-        title=f"45-degree bend, load {load:g}",
-        about="An arc of 45 degrees (radius 100, unit square section, E = 1e7, J = 1/6) is clamped "
-        "at one end and loaded out of its plane at the other. Compared: the place of the tip.",
+        "bend-45",
+        f"{load:g}",
         spec=spec,
         lay=lay,
         probe=probe,
@@ -297,13 +272,8 @@ def make_ring(ratio: float) -> Case:
         return np.array([compute_critical_twist(flat, twisted, angle, n_neutral=1)])
 
     return _IN_SPACE(
-        id=f"ring-twist-{ratio:g}",
-        family="ring-twist",
-        title=f"Twisted ring (Michell), GJ / EI = {ratio:g}",
-        about="A hose bent into a ring, its ends clamped to each other, is twisted until it leaves "
-        "its plane. Compared: the angle at which the flat ring loses its stability, "
-        "2 pi sqrt(3) EI / GJ. A turn about the clamps' tangent costs nothing; the mode after it "
-        "counts.",
+        "ring-twist",
+        f"{ratio:g}",
         spec=replace(STOUT, torsional_stiffness=ratio * BENDING_STIFFNESS),
         lay=lay,
         probe=probe,
@@ -335,11 +305,8 @@ def make_greenhill(pull: float) -> Case:
         return np.array([critical * LENGTH / BENDING_STIFFNESS])
 
     return _IN_SPACE(
-        id=f"greenhill-pull-{pull:g}",
-        family="greenhill",
-        title=f"Twisted rod under tension (Greenhill), T L^2 / EI = {pull:g}",
-        about="A straight rod, both ends clamped, under tension T is twisted until it writhes. "
-        "Compared: the moment M at which the straight state loses its stability, as M L / EI.",
+        "greenhill",
+        f"{pull:g}",
         spec=STOUT,
         lay=lay,
         probe=probe,
@@ -383,10 +350,7 @@ def make_helix() -> Case:
         return np.array([envelope, reaction.force[0], reaction.moment[0]])
 
     return _IN_SPACE(
-        id="helix",
-        title="Localized helix with 27 turns",
-        about="A long rod with 27 turns of twist and a slack of 3 % coils up in its middle. "
-        "Compared: the largest angle to the axis, tension and moment, with the infinite rod's.",
+        "helix",
         spec=spec,
         lay=lay,
         probe=probe,
@@ -437,10 +401,7 @@ def make_coil() -> Case:
         return np.array([longer / force])
 
     return _IN_SPACE(
-        id="coil",
-        title="Coil spring of 12 turns under an axial wrench",
-        about="A hose that is a coil at rest (pitch angle .1) is pulled along its axis, a little. "
-        "Compared: its softness, L [(R cos a)^2 / GJ + (R sin a)^2 / EI].",
+        "coil",
         spec=spec,
         lay=lay,
         probe=probe,

@@ -147,7 +147,8 @@ def run_study(
     grid = QUICK if quick else FULL
     for place, case in enumerate(cases):
         head = f"{place + 1}/{len(cases)} {case.id}"
-        study.results.append(run_case(case, models, grid, partial(_advance_case, advance, head)))
+        tell = partial(lambda head, text: advance(f"{head}: {text}"), head)
+        study.results.append(run_case(case, models, grid, tell))
     study.checks += check_statics(study.results)
     for result in study.results:
         if result.case.motion is not None:
@@ -159,10 +160,6 @@ def run_study(
     if with_numerics:
         _run_numerics(study, np.random.default_rng(seed), advance)
     return study
-
-
-def _advance_case(advance: Callable[[str], None], head: str, text: str) -> None:
-    advance(f"{head}: {text}")
 
 
 def _run_numerics(study: Study, rng: np.random.Generator, advance: Callable[[str], None]) -> None:

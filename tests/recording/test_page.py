@@ -6,7 +6,7 @@ import pytest
 from hose_mj.checks import Check
 from hose_mj.errors import InputError
 from hose_mj.recording.page import Page, Picture, group_checks
-from hose_mj.recording.plots.api import plot_series
+from hose_mj.recording.plots.curves import plot_series
 
 NASTY = "<script>alert('&\"')</script>"
 

@@ -10,6 +10,7 @@ import pytest
 from hose_mj.errors import InputError
 from hose_mj.hoses.registry import MODELS
 from hose_mj.validation import cases
+from hose_mj.validation.case import read_texts
 from hose_mj.validation.cases import CASES, find_cases
 from hose_mj.validation.compare import INEXTENSIBLE
 from hose_mj.validation.run import simulate
@@ -52,6 +53,12 @@ def test_ids_are_unique_and_start_with_their_family():
         # A family's name alone selects all its values, so it may not be the id of one of several.
         if case.id in families:
             assert [other.id for other in CASES if other.family == case.id] == [case.id]
+
+
+def test_every_text_belongs_to_a_case():
+    names = {name for case in CASES for name in (case.id, case.family)}
+    assert set(read_texts()) <= names
+    assert not any("{}" in case.title for case in CASES)
 
 
 def test_the_published_ids_are_there():

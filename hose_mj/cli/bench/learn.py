@@ -41,7 +41,8 @@ def measure(quick: bool, seed: int) -> Bench:
     """Times D-RR-QL with its goal module and three veto modules on the line task."""
     rounds, seconds = (3, 0.3) if quick else (7, 1.0)
     bench = Bench()
-    plain = _measure_plain(seed)
+    # The same source where nothing at all is compiled.
+    plain = _run_child("time_plain", seed, NUMBA_DISABLE_JIT="1")
     bench.records.append(Record("learn", PEER, plain, "moves/s"))
     for n_robots, least in LEAST_MOVES.items():
         moves = measure_rate(train_in_blocks(n_robots, seed), rounds, seconds)
@@ -88,11 +89,6 @@ def _time_ten_million(seed: int) -> float:
     begun = time.process_time()
     training.advance(moves=10_000_000)
     return time.process_time() - begun
-
-
-def _measure_plain(seed: int) -> float:
-    """Returns the moves/s of the same source where nothing at all is compiled."""
-    return _run_child("time_plain", seed, NUMBA_DISABLE_JIT="1")
 
 
 def _run_child(function: str, seed: int, **environment: str) -> float:

@@ -1,9 +1,9 @@
-"""Plots of curves: convergence with orders, numbers over time, learning, twist along a hose."""
+"""Plots of curves: convergence with orders, numbers over time, learning."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,9 +17,7 @@ from hose_mj.recording.palette import LIMIT, OTHERS, darken, find_model, format_
 from hose_mj.recording.plots.labels import label_line_ends
 from hose_mj.recording.plots.style import (
     DASHES,
-    SOFT,
     Look,
-    check_curve,
     check_pair,
     check_some,
     choose_looks,
@@ -128,69 +126,16 @@ def _choose_looks(labels: Sequence[str]) -> dict[str, Look]:
     kinds = [label.rpartition(", ")[0] or label for label in labels]
     if any(find_model(label) for label in labels) or len(set(kinds)) == len(kinds):
         looks = choose_looks(labels)
-        return {
-            label: Look(look.color, look.ink, _MARKERS[place % 5], look.dashes)
-            if find_model(label) is None
-            else look
-            for place, (label, look) in enumerate(looks.items())
-        }
+        for place, (label, look) in enumerate(looks.items()):
+            if find_model(label) is None:
+                looks[label] = replace(look, marker=_MARKERS[place % 5])
+        return looks
     colors = {kind: OTHERS[place % len(OTHERS)] for place, kind in enumerate(dict.fromkeys(kinds))}
-    return {
-        label: Look(
-            format_hex(colors[kind]),
-            format_hex(darken(colors[kind])),
-            _MARKERS[kinds[:place].count(kind) % 5],
-            "-",
-        )
-        for place, (label, kind) in enumerate(zip(labels, kinds, strict=True))
-    }
-
-
-def plot_twist(
-    title: str,
-    arc_lengths: ArrayLike,
-    shape: ArrayLike,
-    twists: Mapping[str, ArrayLike],
-    knots: ArrayLike = (),
-) -> bytes:
-    """Draws the shape above, the twist below, over one axis of arc length.
-
-    Args:
-        title: text.
-        arc_lengths: (k,), m.
-        shape: the centre line there (k, 3), m, of which y and z are drawn.
-        twists: label to twist (k,), rad/m.
-        knots: arc lengths marked by thin lines.
-
-    Raises:
-        InputError: nothing to draw, or shapes that do not fit.
-    """
-    check_some("twists", twists)
-    points = check_curve("shape", shape)[0]
-    looks = choose_looks(list(twists))
-    ends = []
-    with make_figure((7.6, 5.0), title) as figure:
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
-        for name, dim, dashes in (("y", 1, "-"), ("z", 2, (0, (5, 2)))):
-            s, height = check_pair(name, arc_lengths, points[:, dim])
-            above.plot(s, height, color="#444444", ls=dashes)
-            ends.append((float(height[-1]), name, "#444444"))
-        above.set_ylabel("shape (m)")
-        figure.draw_without_rendering()
-        label_line_ends(above, ends)
-        ends = []
-        for label, values in twists.items():
-            s, twist = check_pair(label, arc_lengths, values)
-            below.plot(s, twist, color=looks[label].color, ls=looks[label].dashes)
-            ends.append((float(twist[-1]), name_model(label), looks[label].ink))
-        for knot in np.ravel(knots):
-            below.axvline(knot, color=SOFT, lw=0.5, ls=(0, (1, 3)), zorder=0)
-        below.set_xlim(float(np.min(s)), float(np.max(s)))
-        below.set_xlabel("arc length (m)")
-        below.set_ylabel("twist (rad/m)")
-        figure.draw_without_rendering()
-        label_line_ends(below, ends)
-        return encode_png(figure)
+    looks = {}
+    for place, (label, kind) in enumerate(zip(labels, kinds, strict=True)):
+        color, marker = colors[kind], _MARKERS[kinds[:place].count(kind) % 5]
+        looks[label] = Look(format_hex(color), format_hex(darken(color)), marker, "-")
+    return looks
 
 
 PANEL = (4.6, 3.5)

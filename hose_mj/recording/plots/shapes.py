@@ -15,13 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hose_mj.recording.episode import Array
-from hose_mj.recording.palette import (
-    darken,
-    find_color,
-    format_hex,
-    lighten,
-    name_model,
-)
+from hose_mj.recording.palette import darken, find_color, format_hex, lighten, name_model
 from hose_mj.recording.plots.labels import Label, label_points
 from hose_mj.recording.plots.statics import shade
 from hose_mj.recording.plots.style import (
@@ -115,17 +109,18 @@ def label_snapshots(
     """Writes the times beside snapshots, once all else is laid out."""
     if times is None:
         return
-    every = np.concatenate([stack.reshape(-1, 2) for stack in stacks.values()])
+    every = np.concatenate(_list_corners(stacks))
     factor = choose_length_unit(float(np.ptp(every, axis=0).max()))[1]
     first = factor * next(iter(stacks.values()))
     spots = first[:, choose_label_point(first)]
     near = 0.02 * factor * float(np.ptp(every, axis=0).max())
-    notes = [
-        Label(spots[k[0], 0], spots[k[0], 1], _name_times([times[i] for i in k]), PLAIN)
-        for k in group_places(spots, near)
-    ]
-    lines = [factor * shape.T for stack in stacks.values() for shape in stack]
-    label_points(figure, axes, notes, [(x, y) for x, y in lines])
+    notes = []
+    for run in group_places(spots, near):
+        names = dict.fromkeys((f"{times[run[0]]:.3g} s", f"{times[run[-1]]:.3g} s"))
+        x, y = spots[run[0]]
+        notes.append(Label(x, y, " to ".join(names), PLAIN))
+    lines = [tuple(factor * shape.T) for stack in stacks.values() for shape in stack]
+    label_points(figure, axes, notes, lines)
 
 
 def plot_fan(title: str, fans: Sequence[Fan], plane: tuple[int, int] = (0, 2)) -> bytes:
@@ -204,19 +199,12 @@ def _set_view(axes: Axes, points: Array, unit: str, plane: tuple[int, int]) -> N
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 0.12 * float((high - low).max()) or 1.0)
     middle = 0.5 * (low + high)
-    axes.set_xlim(middle[0] - 0.56 * extent[0], middle[0] + 0.56 * extent[0])
-    axes.set_ylim(middle[1] - 0.56 * extent[1], middle[1] + 0.56 * extent[1])
     axes.set_aspect("equal", adjustable="box")
-    for axis, share in ((axes.xaxis, extent[0]), (axes.yaxis, extent[1])):
-        n_ticks = 7 if share > 0.6 * extent.max() else 4
+    for k, (name, axis) in enumerate((("x", axes.xaxis), ("y", axes.yaxis))):
+        limits = (middle[k] - 0.56 * extent[k], middle[k] + 0.56 * extent[k])
+        axes.set(**{f"{name}lim": limits, f"{name}label": f"{'xyz'[plane[k]]} ({unit})"})
+        n_ticks = 7 if extent[k] > 0.6 * extent.max() else 4
         axis.set_major_locator(MaxNLocator(n_ticks, steps=(1, 2, 2.5, 5, 10)))
-    axes.set_xlabel(f"{'xyz'[plane[0]]} ({unit})")
-    axes.set_ylabel(f"{'xyz'[plane[1]]} ({unit})")
-
-
-def _name_times(times: Sequence[float]) -> str:
-    first, last = f"{times[0]:.3g} s", f"{times[-1]:.3g} s"
-    return first if len(times) == 1 else f"{first} to {last}"
 
 
 def _wrap(title: str, size: tuple[float, float]) -> str:

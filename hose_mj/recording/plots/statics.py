@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,14 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter, NullLocator
 
-from hose_mj.recording.palette import (
-    Rgb,
-    darken,
-    find_color,
-    format_hex,
-    lighten,
-    name_model,
-)
+from hose_mj.recording.palette import Rgb, darken, find_color, format_hex, lighten, name_model
 from hose_mj.recording.plots.labels import label_line_ends
 from hose_mj.recording.plots.style import (
     ERRORS,
@@ -32,6 +26,10 @@ from hose_mj.recording.plots.style import (
     label_resolutions,
     make_figure,
 )
+
+_RAW: dict[str, Any] = {"ls": ":", "lw": 0.9, "ms": 3.6, "mfc": "white", "mew": 0.8, "zorder": 2}
+_RAW["alpha"] = 0.55
+_CORRECTED: dict[str, Any] = {"ls": "-", "lw": 1.4, "ms": 4.2, "mew": 0.8, "zorder": 3}
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,7 @@ def plot_errors(
             _draw_panel(axes, model, [p for p in drawn if p.model == model], parameters)
         panels[0].set_ylabel(ylabel)
         _set_errors(panels[0], drawn)
-        handles = _make_handles(drawn, len(points) - len(drawn))
-        add_legend(figure, handles)
+        add_legend(figure, _make_handles(drawn, len(points) - len(drawn)))
         _name_lines(figure, panels, models, drawn, parameters)
         return encode_png(figure)
 
@@ -102,19 +99,8 @@ def _draw_panel(
                 for p in points
                 if p.parameter == parameter and (p.clamp_corrected is False) == raw
             )
-            axes.plot(
-                [resolution for resolution, _ in line],
-                [error for _, error in line],
-                color=color,
-                ls=":" if raw else "-",
-                lw=0.9 if raw else 1.4,
-                marker=marker,
-                ms=3.6 if raw else 4.2,
-                mfc="white" if raw else color,
-                mew=0.8,
-                alpha=0.55 if raw else 1.0,
-                zorder=2 if raw else 3,
-            )
+            style = _RAW if raw else {**_CORRECTED, "mfc": color}
+            axes.plot(*np.array(line).reshape(-1, 2).T, color=color, marker=marker, **style)
     axes.set_xscale("log")
     axes.xaxis.set_minor_formatter(NullFormatter())
     label_resolutions(axes, np.array([p.resolution for p in points], dtype=np.float64))

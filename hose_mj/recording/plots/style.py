@@ -83,11 +83,9 @@ def choose_looks(labels: Sequence[str]) -> dict[str, Look]:
         model = find_model(label)
         count = seen.get(model, 0)
         seen[model] = count + 1
-        color = find_color(label, count)
+        color, marker = find_color(label, count), MARKERS.get(model or "", ".")
         dashes = "-" if model is None else DASHES[count % len(DASHES)]
-        looks[label] = Look(
-            format_hex(color), format_hex(darken(color)), MARKERS.get(model or "", "."), dashes
-        )
+        looks[label] = Look(format_hex(color), format_hex(darken(color)), marker, dashes)
     return looks
 
 
@@ -242,7 +240,6 @@ def check_curve(label: str, points: ArrayLike) -> Array:
     stack = np.asarray(points, dtype=np.float64)
     stack = stack[None] if stack.ndim == 2 else stack
     if stack.ndim != 3 or stack.shape[2] != 3 or 0 in stack.shape or not np.all(np.isfinite(stack)):
-        raise InputError(
-            f"curve {label!r}", np.shape(points), "finite points of shape (m, 3) or (k, m, 3)"
-        )
+        valid = "finite points of shape (m, 3) or (k, m, 3)"
+        raise InputError(f"curve {label!r}", np.shape(points), valid)
     return stack

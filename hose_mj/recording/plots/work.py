@@ -5,7 +5,7 @@ Arrows say how much more a peer costs at equal error.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,9 +98,9 @@ def plot_work_precision(title: str, points: Sequence[WorkPoint], gaps: Sequence[
     """
     check_some("points", points)
     with make_axes(title, (8.4, 5.4)) as (figure, axes):
-        drawing = draw_work_precision(axes, points, gaps)
-        add_legend(figure, drawing.handles)
-        label_work_precision(figure, axes, drawing)
+        handles, label = _draw_work(figure, axes, points, gaps)
+        add_legend(figure, handles)
+        label()
         return encode_png(figure)
 
 
@@ -125,50 +125,36 @@ def plot_overview(
     with make_figure(OVERVIEW) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.12))
         for axes, caption in zip((left, right), captions, strict=True):
-            _write_caption(axes, caption)
+            head, _, rest = caption.partition("\n")
+            axes.set_title(head, pad=22.0 if rest else 8.0)
+            where: Any = {"xycoords": "axes fraction", "xytext": (0, 7), "fontsize": 8.5}
+            write_note(axes, rest, (0.0, 1.0), **where)
         stacks = {label: check_curve(label, curve)[:, :, [0, 2]] for label, curve in curves.items()}
-        handles = draw_shapes(left, stacks)
-        left.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.05, -0.13))
-        left.set_anchor("N")
-        drawing = draw_work_precision(right, points, gaps)
-        columns = -(-len(drawing.handles) // 2)
-        right.legend(
-            handles=drawing.handles, loc="upper left", bbox_to_anchor=(-0.08, -0.13), ncols=columns
+        left.legend(
+            handles=draw_shapes(left, stacks), loc="upper left", bbox_to_anchor=(-0.05, -0.13)
         )
+        left.set_anchor("N")
+        handles, label = _draw_work(figure, right, points, gaps, spacing=34.0)
+        below: Any = {"loc": "upper left", "bbox_to_anchor": (-0.08, -0.13)}
+        right.legend(handles=handles, ncols=-(-len(handles) // 2), **below)
         label_snapshots(figure, left, stacks, times)
-        label_work_precision(figure, right, drawing, spacing=34.0)
+        label()
         return encode_png(figure)
 
 
-def _write_caption(axes: Axes, caption: str) -> None:
-    head, _, rest = caption.partition("\n")
-    axes.set_title(head, pad=22.0 if rest else 8.0)
-    write_note(axes, rest, (0.0, 1.0), xycoords="axes fraction", xytext=(0, 7), fontsize=8.5)
+def _draw_work(
+    figure: Figure,
+    axes: Axes,
+    points: Sequence[WorkPoint],
+    gaps: Sequence[Gap] = (),
+    spacing: float = 20.0,
+) -> tuple[list[Line2D], Callable[[], None]]:
+    """Draws all but the labels of points into axes.
 
-
-@dataclass(frozen=True)
-class WorkDrawing:
-    """The parts of a plot that its legend and its labels have to know.
-
-    Attributes:
-        handles: what the legend has to hold.
-        fronts: of the series that are not raw.
-        lines: x and y of what labels keep off.
-        notes: already written, with their arrows.
-        looks: by model.
+    Returns:
+        what the legend has to hold, and what labels front points `spacing` apart (points of
+        length) once the rest is laid out.
     """
-
-    handles: list[Line2D]
-    fronts: list[list[WorkPoint]]
-    lines: list[tuple[Array, Array]]
-    notes: list[Annotation]
-    looks: Mapping[str, Look]
-
-
-def draw_work_precision(
-    axes: Axes, points: Sequence[WorkPoint], gaps: Sequence[Gap] = ()
-) -> WorkDrawing:
-    """Draws all but the labels of points into axes."""
     drawn = [p for p in points if is_positive(p.error) and is_positive(p.wall_s_per_sim_s)]
     looks = choose_looks(list(dict.fromkeys(p.model for p in points)))
     fronts = {
@@ -181,24 +167,24 @@ def draw_work_precision(
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: format_seconds(value)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_percent(value)))
     notes: list[Annotation] = draw_levels(axes, ERRORS)
-    _draw_real_time(axes)
+    low, high = axes.get_xlim()
+    if low < 1.0 < high:  # a line where a simulated second takes a second
+        axes.axvline(1.0, color="#bbbbbb", lw=0.8, zorder=1)
+        where: Any = {"xycoords": ("data", "axes fraction"), "xytext": (-2, 0), "rotation": 90}
+        write_note(axes, "real time", (1.0, 0.985), **where, ha="right", va="top")
     notes += [note for gap in gaps for note in _draw_gap(axes, gap, looks[gap.against])]
     lines = [
         (np.array([p.wall_s_per_sim_s for p in front]), np.array([p.error for p in front]))
         for front in fronts.values()
     ]
-    handles = _make_handles(looks, drawn, len(points) - len(drawn))
     shown = [front for (_, raw), front in fronts.items() if not raw]
-    return WorkDrawing(handles, shown, lines, notes, looks)
 
+    def label() -> None:
+        figure.draw_without_rendering()
+        wanted = _choose_labels(axes, shown, looks, spacing)
+        label_points(figure, axes, wanted, lines, notes)
 
-def label_work_precision(
-    figure: Figure, axes: Axes, drawing: WorkDrawing, spacing: float = 20.0
-) -> None:
-    """Labels front points `spacing` apart (points of length), once the rest is laid out."""
-    figure.draw_without_rendering()
-    wanted = _choose_labels(axes, drawing.fronts, drawing.looks, spacing)
-    label_points(figure, axes, wanted, drawing.lines, drawing.notes)
+    return _make_handles(looks, drawn, len(points) - len(drawn)), label
 
 
 def compute_pareto_front(cost: Array, error: Array) -> Array:
@@ -221,30 +207,12 @@ def _draw_series(axes: Axes, group: Sequence[WorkPoint], look: Look) -> list[Wor
     faint: dict[str, Any] = {"ls": "", "marker": look.marker, "ms": 2.6, "alpha": 0.28, "mew": 0.5}
     face = "none" if raw else look.color
     axes.plot(cost[beaten], error[beaten], color=look.color, mfc=face, zorder=2, **faint)
-    axes.plot(
-        cost[front],
-        error[front],
-        color=look.color,
-        ls=":" if raw else "-",
-        lw=0.9 if raw else 1.3,
-        marker=look.marker,
-        ms=4.2 if raw else 5.0,
-        mfc="white" if raw else look.color,
-        mec=look.color if raw else "white",
-        mew=0.9 if raw else 0.5,
-        alpha=0.5 if raw else 1.0,
-        zorder=3 if raw else 4,
-    )
+    full: dict[str, Any] = {"ls": "-", "lw": 1.3, "ms": 5.0, "mec": "white", "mew": 0.5}
+    if raw:
+        full = {"ls": ":", "lw": 0.9, "ms": 4.2, "mfc": "white", "mew": 0.9, "alpha": 0.5}
+    full |= {"color": look.color, "marker": look.marker, "zorder": 3 if raw else 4}
+    axes.plot(cost[front], error[front], **full)
     return [group[i] for i in front]
-
-
-def _draw_real_time(axes: Axes) -> None:
-    """Draws a line where a simulated second takes a second."""
-    low, high = axes.get_xlim()
-    if low < 1.0 < high:
-        axes.axvline(1.0, color="#bbbbbb", lw=0.8, zorder=1)
-        where: Any = {"xycoords": ("data", "axes fraction"), "xytext": (-2, 0), "rotation": 90}
-        write_note(axes, "real time", (1.0, 0.985), **where, ha="right", va="top")
 
 
 def _draw_gap(axes: Axes, gap: Gap, look: Look) -> tuple[Annotation, Annotation]:
@@ -257,29 +225,16 @@ def _draw_gap(axes: Axes, gap: Gap, look: Look) -> tuple[Annotation, Annotation]
     assert root is not None
     place = axes.transData + ScaledTranslation(0.0, side * _SHIFT / 72.0, root.dpi_scale_trans)
     ends: Any = {"arrowstyle": "|-|,widthA=0.25,widthB=0.25", "shrinkA": 0.0, "shrinkB": 0.0}
-    arrow = axes.annotate(
-        "",
-        (gap.cost_against, gap.at_error),
-        (gap.cost, gap.at_error),
-        xycoords=place,
-        textcoords=place,
-        arrowprops={"color": look.ink, "lw": 0.9, **ends},
-        zorder=5,
-    )
+    start, end = (gap.cost, gap.at_error), (gap.cost_against, gap.at_error)
+    line: Any = {"arrowprops": {"color": look.ink, "lw": 0.9, **ends}, "zorder": 5}
+    arrow = axes.annotate("", end, start, xycoords=place, textcoords=place, **line)
     ratio = gap.cost_against / gap.cost
+    text = f"{ratio:.0f}\u00d7" if ratio >= 10.0 else f"{ratio:.1f}\u00d7"
+    share, above = (0.72, "bottom") if side > 0.0 else (0.55, "top")
     style: Any = {"fontsize": 9.0, "fontweight": "bold", "path_effects": HALO, "zorder": 7}
-    number = write_note(
-        axes,
-        f"{ratio:.0f}\u00d7" if ratio >= 10.0 else f"{ratio:.1f}\u00d7",
-        (gap.cost * ratio ** (0.72 if side > 0.0 else 0.55), gap.at_error),
-        xycoords=place,
-        xytext=(0.0, side * 1.5),
-        ha="center",
-        va="bottom" if side > 0.0 else "top",
-        color=look.ink,
-        **style,
-    )
-    return arrow, number
+    style |= {"xycoords": place, "xytext": (0.0, side * 1.5), "ha": "center", "va": above}
+    at = (gap.cost * ratio**share, gap.at_error)
+    return arrow, write_note(axes, text, at, color=look.ink, **style)
 
 
 def _choose_labels(
@@ -292,7 +247,8 @@ def _choose_labels(
 
     The others of a series stand `spacing` apart from all that were chosen before them.
     """
-    first = [p for front in fronts for p in _find_reaching(front)]
+    reaching = [[p for p in front if p.error <= level] for front in fronts for level in ERRORS]
+    first = [min(some, key=lambda p: p.wall_s_per_sim_s) for some in reaching if some]
     chosen = list(first)
     for front in fronts:
         near = [_locate(axes, p) for p in first if p in front]
@@ -301,22 +257,11 @@ def _choose_labels(
             if all(np.hypot(*(here - other)) >= spacing * DPI / 72.0 for other in near):
                 near.append(here)
                 chosen.append(p)
+    sides = {"geds planar": -1}
     return [
-        Label(
-            p.wall_s_per_sim_s,
-            p.error,
-            p.label,
-            looks[p.model].ink,
-            -1 if p.model == "geds planar" else 1,
-        )
+        Label(p.wall_s_per_sim_s, p.error, p.label, looks[p.model].ink, sides.get(p.model, 1))
         for p in dict.fromkeys(chosen)
     ]
-
-
-def _find_reaching(front: Sequence[WorkPoint]) -> list[WorkPoint]:
-    """Returns the cheapest point below each level."""
-    reached = ([p for p in front if p.error <= level] for level in ERRORS)
-    return [min(some, key=lambda p: p.wall_s_per_sim_s) for some in reached if some]
 
 
 def _locate(axes: Axes, point: WorkPoint) -> Array:

@@ -15,13 +15,13 @@ from hose_mj.recording.episode import Array, HoseTrack, Scene, Series, check_uni
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.palette import LIMIT, find_color, lighten, name_model
 from hose_mj.recording.rerun.parts import (
-    DARK,
     HALF_VIEW,
-    TIMELINE,
     escape_cell,
     format_table,
     log_document,
     log_scalars,
+    make_blueprint,
+    make_space_view,
     make_time,
     name_quantity,
     open_stream,
@@ -90,10 +90,6 @@ class Framing:
         step = 0.003 * self.size * ahead / np.linalg.norm(ahead) if self.is_planar else np.zeros(3)
         return {track.name: rank * step for rank, track in enumerate(scene.tracks)}
 
-    def place_legend(self, n: int) -> Array:
-        """Returns n places in a column, downwards from the corner, (n, 3)."""
-        return self.corner - 0.14 * self.half_height * np.arange(n)[:, None] * self.up
-
 
 def compute_framing(scene: Scene) -> Framing:
     """Looks straight on at a planar scene and from above at an angle at any other."""
@@ -106,7 +102,11 @@ def compute_framing(scene: Scene) -> Framing:
     axes = np.stack([np.cross(up, outward), up, outward])  # right, up, towards the eye
     seen = points @ axes.T
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    distance = _fit_distance(seen - middle, size)
+    # From there the eye sees all points.
+    about = seen - middle
+    room = np.maximum(np.abs(about[:, 0]) / _ASPECT, np.abs(about[:, 1]))
+    needed = float(np.max(1.25 * room / HALF_VIEW + about[:, 2]))
+    distance = max(needed, 0.25 * size / HALF_VIEW)
     half_height = distance * HALF_VIEW
     left = seen[:, 0].min() - middle[0] - 0.3 * half_height
     left = float(np.clip(left, -1.1 * half_height, -0.9 * half_height))
@@ -123,13 +123,6 @@ def compute_framing(scene: Scene) -> Framing:
         corner=(middle + np.array([left, 0.8 * half_height, 0.0])) @ axes,
         is_planar=bool(flat),
     )
-
-
-def _fit_distance(seen: Array, size: float) -> float:
-    """Returns how far from the target the eye sees all points (k, 3): right, up, towards it."""
-    room = np.maximum(np.abs(seen[:, 0]) / _ASPECT, np.abs(seen[:, 1]))
-    needed = float(np.max(1.25 * room / HALF_VIEW + seen[:, 2]))
-    return max(needed, 0.25 * size / HALF_VIEW)
 
 
 def _choose_directions(flat: list[int]) -> tuple[Array, Array]:
@@ -163,7 +156,8 @@ def write_recording(
     if not recording_id.strip():
         raise InputError("recording_id", recording_id, "a text that is not blank")
     framings = [compute_framing(scene) for scene in scenes]
-    stream, encode = open_stream(make_blueprint(scenes, framings), recording_id)
+    tabs = [_make_tab(scene, framing) for scene, framing in zip(scenes, framings, strict=True)]
+    stream, encode = open_stream(make_blueprint(rrb.Tabs(*tabs, active_tab=0)), recording_id)
     log_document(stream, "settings", f"# Settings\n\n{format_table(settings)}")
     for scene, framing in zip(scenes, framings, strict=True):
         _log_scene(stream, scene, framing)
@@ -175,10 +169,19 @@ def _log_scene(stream: rr.RecordingStream, scene: Scene, framing: Framing) -> No
     log_document(stream, f"{scene.name}/note", note)
     for track in scene.tracks:
         _log_track(stream, scene, track, framing)
-    _log_legend(stream, scene, framing)
+    steps = 0.14 * framing.half_height * np.arange(len(scene.tracks))
+    legend = rr.Points3D(
+        framing.corner - steps[:, None] * framing.up,
+        colors=[lighten(track.color, 0.3) for track in scene.tracks],
+        labels=[name_model(track.name) for track in scene.tracks],
+        radii=0.0,
+        show_labels=True,
+    )
+    stream.log(f"{scene.name}/legend", legend, static=True)
     for position, series in enumerate(scene.series):
         width = 2.0 + 1.5 * (len(scene.series) - 1 - position)
-        _log_series(stream, entity_of(scene, series), series, position, width)
+        path = f"{_name_folder(scene, series.unit)}/{rr.escape_entity_path_part(series.name)}"
+        _log_series(stream, path, series, position, width)
 
 
 def _log_track(
@@ -200,17 +203,6 @@ def _log_track(
     )
 
 
-def _log_legend(stream: rr.RecordingStream, scene: Scene, framing: Framing) -> None:
-    legend = rr.Points3D(
-        framing.place_legend(len(scene.tracks)),
-        colors=[lighten(track.color, 0.3) for track in scene.tracks],
-        labels=[name_model(track.name) for track in scene.tracks],
-        radii=0.0,
-        show_labels=True,
-    )
-    stream.log(f"{scene.name}/legend", legend, static=True)
-
-
 def _log_series(
     stream: rr.RecordingStream, path: str, series: Series, position: int, width: float
 ) -> None:
@@ -226,59 +218,34 @@ def _log_series(
         log_scalars(stream, f"{path}/limit", times, values, name, LIMIT, 1.0)
 
 
-def entity_of(scene: Scene, series: Series) -> str:
-    """Returns the entity path of a series."""
-    unit = rr.escape_entity_path_part(series.unit or _UNITLESS)
-    return f"{scene.name}/series/{unit}/{rr.escape_entity_path_part(series.name)}"
-
-
-def make_blueprint(scenes: Sequence[Scene], framings: Sequence[Framing]) -> rrb.Blueprint:
-    """Lays out one tab per scene: hoses above, numbers below, note and settings at the side."""
-    tabs = [_make_tab(scene, framing) for scene, framing in zip(scenes, framings, strict=True)]
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
-    )
+def _name_folder(scene: Scene, unit: str) -> str:
+    """Returns the entity path of the series of one unit."""
+    return f"{scene.name}/series/{rr.escape_entity_path_part(unit or _UNITLESS)}"
 
 
 def _make_tab(scene: Scene, framing: Framing) -> rrb.Horizontal:
-    above = rrb.Spatial3DView(
+    above = make_space_view(
+        scene.title,
+        (framing.eye, framing.target, framing.eye_up),
+        (framing.grid_spacing, framing.grid_normal, framing.grid_distance),
         origin=f"/{scene.name}",
-        name=scene.title,
         contents=[f"/{scene.name}/hoses/**", f"/{scene.name}/legend"],
-        background=rrb.Background(color=DARK),
-        line_grid=rrb.LineGrid3D(
-            visible=True,
-            spacing=framing.grid_spacing,
-            plane=rr.components.Plane3D(framing.grid_normal, framing.grid_distance),
-            color=(255, 255, 255, 12),
-        ),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=framing.eye,
-            look_target=framing.target,
-            eye_up=framing.eye_up,
-        ),
     )
     units = list(dict.fromkeys(series.unit for series in scene.series))
-    below = [_make_plot(scene, unit) for unit in units]
+    below = [
+        rrb.TimeSeriesView(
+            origin=f"/{_name_folder(scene, unit)}",
+            name=name_quantity(unit),
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=True),
+        )
+        for unit in units
+    ]
     left = rrb.Vertical(above, *below, row_shares=[2.2] + [1.0] * len(below))
     side = rrb.Vertical(
         rrb.TextDocumentView(origin=f"/{scene.name}/note", name="What is shown"),
         rrb.TextDocumentView(origin="/settings", name="Settings"),
     )
     return rrb.Horizontal(left, side, column_shares=[3.2, 1.0], name=scene.name)
-
-
-def _make_plot(scene: Scene, unit: str) -> rrb.TimeSeriesView:
-    origin = f"/{scene.name}/series/{rr.escape_entity_path_part(unit or _UNITLESS)}"
-    return rrb.TimeSeriesView(
-        origin=origin,
-        name=name_quantity(unit),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=True),
-    )
 
 
 def format_legend(scene: Scene) -> str:

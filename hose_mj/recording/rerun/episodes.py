@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 import uuid
 from collections.abc import Sequence
@@ -13,15 +12,15 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from hose_mj.errors import HoseError, InputError
+from hose_mj.errors import InputError
 from hose_mj.recording.episode import check_unique
 from hose_mj.recording.files import make_temp_beside, replace_atomically, write_atomically
 from hose_mj.recording.grid import GridEpisode
-from hose_mj.recording.rerun.parts import APPLICATION_ID, open_stream
+from hose_mj.recording.rerun.parts import APPLICATION_ID, is_listening, open_stream, wait_until
 from hose_mj.recording.rerun.viewer import open_window
 from hose_mj.recording.rerun.world_log import WorldLog
 from hose_mj.recording.rerun.world_scene import (
-    choose_look,
+    Look,
     log_scene,
     log_settings,
     make_world_blueprint,
@@ -58,7 +57,7 @@ def write_world_recording(
     log_settings(stream, scenes, [describe_ending(e.scene, e.ending) for e in episodes])
     log_scene(stream, scenes[0])
     for rank, episode in enumerate(episodes):
-        log = WorldLog(stream, episode.scene, choose_look(rank))
+        log = WorldLog(stream, episode.scene, Look(rank))
         log.add(episode.samples)
         log.end(episode.ending)
     write_atomically(Path(path), encode())
@@ -78,9 +77,8 @@ class RecordingFile:
     def begin(self, scene: SceneDescription) -> None:
         """Opens the file, under another name as yet; `OSError` where there can be none."""
         self._temp = make_temp_beside(self._path)
-        self._scene = scene
-        self._stream, self._encode = open_stream(make_world_blueprint([scene]), self._id)
-        self._log = open_log(self._stream, scene)
+        stream, self._encode = open_stream(make_world_blueprint([scene]), self._id)
+        self._log = open_log(stream, scene)
 
     def add(self, samples: Samples) -> None:
         """Writes a stretch."""
@@ -88,8 +86,7 @@ class RecordingFile:
 
     def end(self, ending: EpisodeEnding) -> None:
         """Writes how it ended, and puts the file in its place."""
-        self._log.end(ending)
-        log_settings(self._stream, [self._scene], [describe_ending(self._scene, ending)])
+        end_log(self._log, ending)
         try:
             self._temp.write_bytes(self._encode())
             replace_atomically(self._temp, self._path)
@@ -107,7 +104,13 @@ def open_log(stream: rr.RecordingStream, scene: SceneDescription) -> WorldLog:
     """Logs what stands still and returns the log of what moves."""
     log_settings(stream, [scene])
     log_scene(stream, scene)
-    return WorldLog(stream, scene, choose_look(0))
+    return WorldLog(stream, scene, Look(0))
+
+
+def end_log(log: WorldLog, ending: EpisodeEnding) -> None:
+    """Logs how an episode ended, in the settings too."""
+    log.end(ending)
+    log_settings(log.stream, [log.scene], [describe_ending(log.scene, ending)])
 
 
 def open_sinks(
@@ -133,20 +136,18 @@ def open_sinks(
         sinks.append(Background(RecordingFile(save, recording_id), "file", lossy=False))
     if connect is not None:
         check_url(connect)
-        live = LiveView(connect, recording_id)
-        sinks.append(make_lossy(live, f"viewer at {connect}", patience_s=1.0))
+        sinks.append(_show_live(connect, recording_id, f"viewer at {connect}", 0.5, 1.0))
     if spawn:
-        live = LiveView(open_window(), recording_id, wait_s=_START_S)
-        sinks.append(make_lossy(live, "viewer", patience_s=_START_S))
+        sinks.append(_show_live(open_window(), recording_id, "viewer", _START_S, _START_S))
     return sinks
 
 
-def make_lossy(live: LiveView, name: str, patience_s: float) -> Background:
+def _show_live(url: str, id: str, name: str, wait_s: float, patience_s: float) -> Background:
     """Returns a live view that never holds up the run, nor the end of the process.
 
     At its end a process would wait for a viewer that does not answer, however long that takes.
     """
-    stop_waiting = rr.unregister_shutdown
+    live, stop_waiting = LiveView(url, id, wait_s), rr.unregister_shutdown
     return Background(live, name, lossy=True, patience_s=patience_s, give_up=stop_waiting)
 
 
@@ -168,8 +169,8 @@ class LiveView:
         Raises:
             HoseError: nobody listens.
         """
-        wait_for(self._url, self._wait)
-        self._scene = scene
+        place, deadline = check_url(self._url), time.monotonic() + self._wait
+        wait_until(lambda: is_listening(*place), deadline, f"no viewer listens at {self._url}")
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)
         self._stream.connect_grpc(self._url)
         self._stream.send_blueprint(make_world_blueprint([scene], follow=True))
@@ -182,8 +183,7 @@ class LiveView:
 
     def end(self, ending: EpisodeEnding) -> None:
         """Sends how it ended."""
-        self._log.end(ending)
-        log_settings(self._stream, [self._scene], [describe_ending(self._scene, ending)])
+        end_log(self._log, ending)
         self._stream.flush(timeout_sec=_STRETCH_S)
         self._stream.disconnect()
 
@@ -199,19 +199,6 @@ def check_url(url: str) -> tuple[str, int]:
     if parts.scheme not in schemes or not parts.hostname or not port or parts.path != "/proxy":
         raise InputError("URL of the viewer", url, "such as rerun+http://127.0.0.1:9876/proxy")
     return parts.hostname, port
-
-
-def wait_for(url: str, wait_s: float) -> None:
-    """Returns once somebody listens at a URL; raises `HoseError` if nobody does in time."""
-    deadline = time.monotonic() + wait_s
-    while True:
-        try:
-            socket.create_connection(check_url(url), timeout=1.0).close()
-            return
-        except OSError:
-            if time.monotonic() > deadline:
-                raise HoseError(f"no viewer listens at {url}") from None
-            time.sleep(0.1)
 
 
 def encode_grid_episode(episode: GridEpisode) -> bytes:

@@ -1,13 +1,17 @@
-"""Pieces that all recordings share: stream, timeline, plain entities, texts, round spacings."""
+"""Pieces that all recordings share: stream, layout, plain entities, texts, waiting."""
 
 from __future__ import annotations
 
+import socket
+import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from hose_mj.errors import HoseError
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import Rgb
 
@@ -43,6 +47,66 @@ def open_stream(
     sink = rr.binary_stream(stream)
     stream.send_blueprint(blueprint, make_active=False, make_default=True)
     return stream, lambda: bytes(sink.read(flush=True) or b"")
+
+
+def make_blueprint(view: rrb.Container, follow: bool = False) -> rrb.Blueprint:
+    """Lays out a view, side panels folded; its time plays in a loop, or follows what comes."""
+    return rrb.Blueprint(
+        view,
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="following" if follow else "playing",
+            loop_mode="off" if follow else "all",
+        ),
+    )
+
+
+def make_space_view(
+    name: str, eye: tuple[Array, Array, Array], grid: tuple[float, Array, float], **more: Any
+) -> rrb.Spatial3DView:
+    """Returns a dark view in space, with a faint grid.
+
+    Args:
+        name: above it.
+        eye: its place, the place it looks at, and what is up there, (3,) each.
+        grid: spacing (m), normal (3,), and distance from the origin along it (m).
+        more: origin, contents and the like.
+    """
+    position, target, up = eye
+    return rrb.Spatial3DView(
+        name=name,
+        background=rrb.Background(color=DARK),
+        line_grid=rrb.LineGrid3D(
+            visible=True,
+            spacing=grid[0],
+            plane=rr.components.Plane3D(grid[1], grid[2]),
+            color=(255, 255, 255, 12),
+        ),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=up
+        ),
+        **more,
+    )
+
+
+def wait_until(is_done: Callable[[], object], deadline: float, why: str) -> None:
+    """Returns once something is done; raises `HoseError` at the deadline (`time.monotonic`)."""
+    while not is_done():
+        if time.monotonic() > deadline:
+            raise HoseError(why)
+        time.sleep(0.1)
+
+
+def is_listening(host: str, port: int) -> bool:
+    """Says whether somebody listens at a port."""
+    try:
+        socket.create_connection((host, port), timeout=1.0).close()
+    except OSError:
+        return False
+    return True
 
 
 def make_time(times: Array) -> rr.TimeColumn:

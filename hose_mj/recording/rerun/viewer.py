@@ -19,12 +19,13 @@ import rerun as rr
 
 from hose_mj.errors import HoseError
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.rerun.parts import TIMELINE
+from hose_mj.recording.rerun.parts import TIMELINE, is_listening, wait_until
 from hose_mj.recording.rerun.reading import read_recording
 
 DEBIAN_PACKAGES = ("mesa-vulkan-drivers", "libvulkan1")
 _HOST = "127.0.0.1"
 _STILL = 3  # pictures in a row that must agree before the viewer counts as done drawing
+_FOLDERS = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME")
 _START_S = 30.0
 """How long a viewer may take to start (s)."""
 
@@ -50,15 +51,12 @@ class Viewer:
 
     def wait_until_listening(self, deadline: float) -> None:
         """Returns once the port answers; raises `HoseError` at the deadline (`time.monotonic`)."""
-        while True:
+
+        def answers() -> bool:
             self.check_alive()
-            try:
-                socket.create_connection((_HOST, self.port), timeout=0.5).close()
-                return
-            except OSError:
-                if time.monotonic() > deadline:
-                    raise HoseError("the viewer did not answer in time") from None
-                time.sleep(0.05)
+            return is_listening(_HOST, self.port)
+
+        wait_until(answers, deadline, "the viewer did not answer in time")
 
 
 @contextmanager
@@ -76,12 +74,14 @@ def start_viewer(size: tuple[int, int]) -> Iterator[Viewer]:
                 stdout=stream,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                env=make_environment(Path(home)),
+                env={**os.environ, **dict.fromkeys(_FOLDERS, home), "RUST_LOG": "error"},
             )
         try:
             yield Viewer(process, port, messages)
         finally:
-            stop(process)
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
 
 
 def open_window(*files: Path) -> str:
@@ -93,7 +93,8 @@ def open_window(*files: Path) -> str:
     Raises:
         HoseError: there is no display.
     """
-    if not has_display():
+    named = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
+    if sys.platform.startswith("linux") and not named:
         raise HoseError(
             "there is no display to open the viewer's window on; take a picture instead "
             "(--screenshot F.png), or save a recording (--save F.rrd) and open it elsewhere"
@@ -109,12 +110,6 @@ def open_window(*files: Path) -> str:
     return f"rerun+http://{_HOST}:{port}/proxy"
 
 
-def has_display() -> bool:
-    """Says whether a window can be opened; it can where X11 and Wayland are not usual."""
-    named = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
-    return bool(named) or not sys.platform.startswith("linux")
-
-
 def make_command(port: int, size: tuple[int, int]) -> list[str]:
     """Returns the command line of a viewer without window, welcome screen or saved state."""
     return [
@@ -123,19 +118,6 @@ def make_command(port: int, size: tuple[int, int]) -> list[str]:
         *("--window-size", f"{size[0]}x{size[1]}"),
         *("--hide-welcome-screen", "--threads", "2"),
     ]
-
-
-def make_environment(home: Path) -> dict[str, str]:
-    """Returns this process's environment, folders moved to `home` and pop-up messages off."""
-    folders = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME")
-    return {**os.environ, **dict.fromkeys(folders, str(home)), "RUST_LOG": "error"}
-
-
-def stop(process: subprocess.Popen[bytes]) -> None:
-    """Ends a process that leads its own group, and the group with it."""
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
 
 
 def find_free_port() -> int:

@@ -18,6 +18,8 @@ from hose_mj.recording.rerun.parts import (
     TIMELINE,
     format_table,
     log_document,
+    make_blueprint,
+    make_space_view,
     name_quantity,
     round_spacing,
 )
@@ -44,22 +46,20 @@ class Look:
 
     Attributes:
         rank: 0 for the first, in the scene's own colours; the others are tinted and see-through.
-        color: of the tint.
     """
 
     rank: int
-    color: Rgb
+
+    @property
+    def color(self) -> Rgb:
+        """Returns the colour of the tint."""
+        return TINTS[self.rank % len(TINTS)]
 
     def tint(self, color: Rgba) -> Rgba:
         """Returns the colour to draw a robot's geom in."""
         if not self.rank:
             return color
         return (*mix(color[:3], self.color, 0.65), round(0.45 * color[3]))
-
-
-def choose_look(rank: int) -> Look:
-    """Returns the look of the episode at a place in the order in which they are overlaid."""
-    return Look(rank, TINTS[rank % len(TINTS)])
 
 
 def path_of(scene: SceneDescription, *parts: str) -> str:
@@ -72,8 +72,12 @@ def log_scene(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for geom in scene.geoms:
         if geom.body == WORLD:
-            log_geom(stream, f"{SCENE}/{rr.escape_entity_path_part(geom.name)}", geom, scene)
-    _log_goal(stream, scene)
+            path = f"{SCENE}/{rr.escape_entity_path_part(geom.name)}"
+            stream.log(path, make_shape(geom, scene, geom.color), static=True)
+    stream.log(f"{SCENE}/goal", make_shape(scene.goal, scene, scene.goal.color), static=True)
+    style: Any = {"radii": 0.0, "colors": [GOAL_COLOR], "show_labels": True}
+    label = rr.Points3D([scene.goal.position], labels=["goal"], **style)
+    stream.log(f"{SCENE}/goal/label", label, static=True)
     _log_bounds(stream, scene)
     _log_cells(stream, scene)
     _log_scale(stream, scene)
@@ -84,7 +88,7 @@ def log_robots(stream: rr.RecordingStream, scene: SceneDescription, look: Look) 
     for geom in scene.geoms:
         if geom.body != WORLD:
             path = path_of(scene, "robots", scene.bodies[geom.body], geom.name)
-            log_geom(stream, path, geom, scene, look)
+            stream.log(path, make_shape(geom, scene, look.tint(geom.color)), static=True)
 
 
 def log_settings(
@@ -121,18 +125,6 @@ def drawn_radius(scene: SceneDescription) -> float:
     return max(scene.hose_radius, 0.003 * scene.size)
 
 
-def log_geom(
-    stream: rr.RecordingStream,
-    path: str,
-    geom: Geom,
-    scene: SceneDescription,
-    look: Look | None = None,
-) -> None:
-    """Logs a shape once, filled, in its frame."""
-    color = geom.color if look is None else look.tint(geom.color)
-    stream.log(path, make_shape(geom, scene, color), static=True)
-
-
 def make_shape(geom: Geom, scene: SceneDescription, color: Rgba) -> Any:
     """Returns the archetype of a shape."""
     x, y, z, w = np.roll(geom.quaternion, -1)
@@ -141,7 +133,11 @@ def make_shape(geom: Geom, scene: SceneDescription, color: Rgba) -> Any:
     radius, half = geom.size[0], geom.size[1]
     place: dict[str, Any] = {"centers": [geom.position], "quaternions": turn}
     if geom.kind == "plane":
-        return _make_plane(geom, scene, turn, filled)
+        # A thin box; it ends where the scene does, if it has no end of its own.
+        thin = np.array([0.0, 0.0, 0.5 * _PLANE_THICKNESS * scene.size])
+        ends = np.where(geom.size[:2] > 0.0, geom.size[:2], 0.75 * scene.size)
+        place["centers"] = [geom.position - rotate(geom.quaternion, thin)]
+        return rr.Boxes3D(half_sizes=[[*ends, thin[2]]], **place, **filled)
     if geom.kind == "box":
         return rr.Boxes3D(half_sizes=[geom.size], **place, **filled)
     if geom.kind in ("sphere", "ellipsoid"):
@@ -154,15 +150,6 @@ def make_shape(geom: Geom, scene: SceneDescription, color: Rgba) -> Any:
         place = {"translations": [start], "quaternions": turn}
         return rr.Capsules3D(lengths=[2.0 * half], radii=[radius], **place, **filled)
     return _make_mesh(geom, color)
-
-
-def _make_plane(geom: Geom, scene: SceneDescription, turn: Any, filled: Any) -> rr.Boxes3D:
-    """Returns a plane as a thin box; it ends where the scene does, if it has no end of its own."""
-    thickness = _PLANE_THICKNESS * scene.size
-    ends = np.where(geom.size[:2] > 0.0, geom.size[:2], 0.75 * scene.size)
-    center = geom.position - rotate(geom.quaternion, np.array([0.0, 0.0, 0.5 * thickness]))
-    sizes = [[*ends, 0.5 * thickness]]
-    return rr.Boxes3D(half_sizes=sizes, centers=[center], quaternions=turn, **filled)
 
 
 def _make_mesh(geom: Geom, color: Rgba) -> rr.Mesh3D:
@@ -184,14 +171,6 @@ def rotate(quaternion: Array, vectors: Array) -> Array:
     w, axis = quaternion[0], quaternion[1:]
     crossed = np.cross(axis, vectors)
     return np.asarray(vectors + 2.0 * (w * crossed + np.cross(axis, crossed)))
-
-
-def _log_goal(stream: rr.RecordingStream, scene: SceneDescription) -> None:
-    log_geom(stream, f"{SCENE}/goal", scene.goal, scene)
-    label = rr.Points3D(
-        [scene.goal.position], labels=["goal"], radii=0.0, colors=[GOAL_COLOR], show_labels=True
-    )
-    stream.log(f"{SCENE}/goal/label", label, static=True)
 
 
 def _log_bounds(stream: rr.RecordingStream, scene: SceneDescription) -> None:
@@ -237,13 +216,9 @@ def _log_scale(stream: rr.RecordingStream, scene: SceneDescription) -> None:
     low, high = tensions[0], tensions[-1]
     places = width * (tensions - low) / (high - low)
     labels = [f"{tension:.3g} N" for tension in tensions]
-    ticks = rr.Points2D(
-        np.column_stack([places, np.full(len(places), height + 7.0)]),
-        labels=labels,
-        radii=0.0,
-        colors=[(200, 206, 214)],
-        show_labels=True,
-    )
+    below = np.column_stack([places, np.full(len(places), height + 7.0)])
+    style: Any = {"radii": 0.0, "colors": [(200, 206, 214)], "show_labels": True}
+    ticks = rr.Points2D(below, labels=labels, **style)
     stream.log(f"{SCALE}/ticks", ticks, static=True)
 
 
@@ -262,79 +237,42 @@ def make_world_blueprint(scenes: Sequence[SceneDescription], follow: bool = Fals
         for one in scenes
         if one.n_control_points
     }
+    shared: Any = {"origin": "/world", "overrides": hidden}
+    ground = scene.low[2] - 0.01 * scene.size
+    grid = (round_spacing(0.1 * scene.size), np.array([0.0, 0.0, 1.0]), ground)
     views = rrb.Horizontal(
-        _make_view(scene, "In space", contents, hidden, _place_eye(scene)),
-        _make_view(scene, "From above", unnamed, hidden, _place_top(scene)),
+        make_space_view("In space", _place_eye(scene), grid, contents=contents, **shared),
+        make_space_view("From above", _place_top(scene), grid, contents=unnamed, **shared),
         column_shares=[1.35, 1.0],
     )
     left = rrb.Vertical(views, _make_scale(scene), _make_plots(scenes), row_shares=[3.4, 0.5, 1.5])
+    # Time, level and text: whose entity it is says little.
+    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/settings", name="Settings"),
         rrb.StateTimelineView(origin="/states", name="Turns, vetoes, breaks"),
-        _make_log(),
+        rrb.TextLogView(origin="/log", name="Events", columns=columns),
         row_shares=[1.6, 1.0, 1.0],
     )
-    return rrb.Blueprint(
-        rrb.Horizontal(left, side, column_shares=[3.4, 1.0]),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(
-            state="collapsed",
-            timeline=TIMELINE,
-            play_state="following" if follow else "playing",
-            loop_mode="off" if follow else "all",
-        ),
-    )
+    both = rrb.Horizontal(left, side, column_shares=[3.4, 1.0])
+    return make_blueprint(both, follow)
 
 
-def _make_log() -> rrb.TextLogView:
-    """Shows time, level and text: whose entity it is says little."""
-    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin="/log", name="Events", columns=columns)
-
-
-def _make_view(
-    scene: SceneDescription, name: str, contents: list[str], hidden: Any, eye: rrb.EyeControls3D
-) -> rrb.Spatial3DView:
-    return rrb.Spatial3DView(
-        origin="/world",
-        name=name,
-        contents=contents,
-        overrides=hidden,
-        background=rrb.Background(color=DARK),
-        line_grid=rrb.LineGrid3D(
-            visible=True,
-            spacing=round_spacing(0.1 * scene.size),
-            plane=rr.components.Plane3D([0.0, 0.0, 1.0], scene.low[2] - 0.01 * scene.size),
-            color=(255, 255, 255, 12),
-        ),
-        eye_controls=eye,
-    )
-
-
-def _place_eye(scene: SceneDescription) -> rrb.EyeControls3D:
-    """Looks from above at an angle, the whole scene in view."""
+def _place_eye(scene: SceneDescription) -> tuple[Array, Array, Array]:
+    """Looks from above at an angle, the whole scene in view: eye, target, up, (3,) each."""
     middle = 0.5 * (scene.low + scene.high)
     outward = np.array(_LOOKS[scene.is_planar])
     outward /= np.linalg.norm(outward)
     radius = 0.5 * float(np.linalg.norm(scene.high - scene.low))
-    eye = middle + radius / HALF_VIEW * outward
-    return rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=[0.0, 0.0, 1.0]
-    )
+    return middle + radius / HALF_VIEW * outward, middle, np.array([0.0, 0.0, 1.0])
 
 
-def _place_top(scene: SceneDescription) -> rrb.EyeControls3D:
+def _place_top(scene: SceneDescription) -> tuple[Array, Array, Array]:
     """Looks straight down, x to the right and y upwards."""
     middle = 0.5 * (scene.low + scene.high)
     room = np.max((scene.high - scene.low)[:2]) / 2.0
     height = np.array([0.0, 0.0, scene.high[2] - middle[2] + 1.12 * room / HALF_VIEW])
-    return rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=middle + height,
-        look_target=middle,
-        eye_up=[0.0, 1.0, 0.0],
-    )
+    return middle + height, middle, np.array([0.0, 1.0, 0.0])
 
 
 def _make_scale(scene: SceneDescription) -> rrb.Spatial2DView:

@@ -95,7 +95,7 @@ class Grasp:
             if move.to is not None:
                 share = move.progress(time)
                 x, y, z = (a + (b - a) * share for a, b in zip(here, move.to, strict=True))
-                here = x, y, z
+                here = (x, y, z)
         return here
 
     def tangent_at(self, time: float) -> Vector | None:
@@ -197,11 +197,13 @@ def _read_position(table: TomlTable, key: str) -> Vector | None:
 
 def _read_tangent(table: TomlTable, clamped: bool) -> Vector | None:
     aim: Vector | None = table.vector("tangent")
-    if aim is not None and not clamped:
+    if aim is None:
+        return None
+    if not clamped:
         raise table.fail("tangent", list(aim), "left out for kind = 'attach'")
-    if aim is not None and math.hypot(*aim) < 1e-9:
+    if math.hypot(*aim) < 1e-9:
         raise table.fail("tangent", list(aim), "three numbers that are not all zero")
-    return None if aim is None else _scale(aim)
+    return _scale(aim)
 
 
 def _read_director(

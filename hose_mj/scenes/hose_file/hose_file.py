@@ -135,7 +135,7 @@ def read_hose_file(path: Path) -> UserHose:
         errors=tuple(sorted(set(errors), reverse=True)),
         budget=budget,
     )
-    if not holds and (duration is None or start != "as-laid"):  # there is no rest shape
+    if not holds and (duration is None or start == "equilibrium"):
         raise file.fail("holds", None, "one hold or more, or study.start = 'as-laid'")
     _check_shape(user, file)
     _check_floor(user, file)

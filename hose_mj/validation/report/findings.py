@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from hose_mj.recording.palette import name_model
-from hose_mj.recording.plots.api import format_seconds
+from hose_mj.recording.plots.style import format_seconds
 from hose_mj.validation.user_hose.answers import Answer
 from hose_mj.validation.user_hose.study import UserHoseStudy
 

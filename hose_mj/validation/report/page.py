@@ -19,8 +19,8 @@ from hose_mj.recording.files import write_atomically
 from hose_mj.recording.page import Block, Page, Picture, Section
 from hose_mj.recording.palette import name_model
 from hose_mj.recording.parquet import write_records
-from hose_mj.recording.plots.api import format_seconds
-from hose_mj.recording.rerun import write_recording
+from hose_mj.recording.plots.style import format_seconds
+from hose_mj.recording.rerun.comparison import write_recording
 from hose_mj.validation import settings
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.report.findings import describe_findings, make_answer_row
@@ -42,6 +42,10 @@ HEADER = ["model", "resolution", "step", "scheme", "clamp", "error", "wall s / s
 _STATIC_COLUMNS = (0, 1, 2, 5, 6)
 """Columns of case and `HEADER` that a static case fills."""
 _RATIO_HEADER = ["case", "error", "against", "GEDS is cheaper by", "GEDS at", "the other at"]
+_RATIO_CAPTION = (
+    "Wall time at equal error, every model at its cheapest setting of the grid; like "
+    "against like: space against the cable and the flex, plane against the hinge chain."
+)
 _TEXTS = Path(__file__).with_name("texts.md")
 
 
@@ -106,31 +110,29 @@ def write_text(page: Page, heading: str, **values: object) -> Section:
     return section
 
 
-def _list_pictures(pictures: Pictures, alts: dict[str, str]) -> list[Picture]:
-    """The pictures by file name that were drawn, with what they show below them."""
-    return [Picture(pictures[name], alt, alt) for name, alt in alts.items() if name in pictures]
+def _show(block: Block, pictures: Pictures, captions: dict[str, str]) -> None:
+    """Adds the pictures by file name that were drawn, with what they show below them, if any."""
+    drawn = [Picture(pictures[n], text, text) for n, text in captions.items() if n in pictures]
+    if drawn:
+        block.figures(drawn)
 
 
 def _write_glance(page: Page, study: Study, pictures: Pictures) -> None:
-    section = page.section("At a glance")
-    failed = [check for check in study.checks if not check.ok]
-    section.paragraph(
-        f"**{len(study.checks) - len(failed)} of {len(study.checks)} checks hold.** GEDS is a "
-        "cubic spline with a banded implicit solve; MuJoCo's composite cable is a chain of rigid "
-        "segments with explicit elastic forces; the hinge chain is its cheapest planar form; the "
-        "flex is a row of point masses with implicit bending, and what MuJoCo 4 is left with."
-    )
+    n_held = sum(check.ok for check in study.checks)
+    section = write_text(page, "At a glance", n_held=n_held, n_checks=len(study.checks))
     _write_verdict(section, study.ratios)
     if "overview" in pictures:
         section.figures([Picture(pictures["overview"], _OVERVIEW)])
-    pair = _list_pictures(pictures, _GLANCE_STATICS)
-    if pair:
-        section.figures(pair)
+    _show(section, pictures, _GLANCE_STATICS)
     _write_ratios(section, study)
     if study.checks:
         section.subsection("Checks").checks(study.checks)
 
 
+_MOTION_PICTURES = {
+    "shapes": "Shapes at a few instants, the earlier the paler.",
+    "distance": "Distance between the models' centre lines over time.",
+}
 _OVERVIEW = "The released rod: snapshots of the motion, and error over wall time of each model"
 _GLANCE_STATICS = {
     "heavy-cantilever-shapes": "A cantilever under growing weight, \u0393 = \u03c1 g L\u00b3 / EI",
@@ -158,11 +160,7 @@ def _write_ratios(section: Section, study: Study) -> None:
     cases = list(dict.fromkeys(ratio.case for ratio in study.ratios))
     like = [ratio for case in cases for ratio in choose_ratios(study.ratios, case)]
     if like:
-        caption = (
-            "Wall time at equal error, every model at its cheapest setting of the grid; like "
-            "against like: space against the cable and the flex, plane against the hinge chain."
-        )
-        section.table(_RATIO_HEADER, [make_ratio_row(ratio) for ratio in like], caption)
+        section.table(_RATIO_HEADER, [make_ratio_row(ratio) for ratio in like], _RATIO_CAPTION)
     rest = [ratio for ratio in study.ratios if ratio not in like]
     if rest:
         fold = section.fold(f"{len(rest)} more ratios, space against plane")
@@ -188,10 +186,7 @@ def _write_motion(section: Section, result: CaseResult, pictures: Pictures) -> N
         block.figure(pictures[f"{case.id}-work-precision"], f"{case.title}: error over wall time")
     pair = [
         Picture(pictures[f"{case.id}-{kind}"], f"{case.title}: {kind}", caption)
-        for kind, caption in (
-            ("shapes", "Shapes at a few instants, the earlier the paler."),
-            ("distance", "Distance between the models' centre lines over time."),
-        )
+        for kind, caption in _MOTION_PICTURES.items()
         if f"{case.id}-{kind}" in pictures
     ]
     if pair:
@@ -325,9 +320,8 @@ def _write_user_hose(
         section.table(_RATIO_HEADER, rows_of_ratios, "Wall time at equal error.")
     section.checks(study.checks)
     section.link("models.rrd: the models overlaid, for the Rerun viewer", "models.rrd")
-    drawn = _list_pictures(pictures, _USER_HOSE_PICTURES)
-    if drawn:
-        page.section("Pictures").figures(drawn)
+    if set(pictures) & set(_USER_HOSE_PICTURES):
+        _show(page.section("Pictures"), pictures, _USER_HOSE_PICTURES)
     write_runs(write_text(page, "How it was measured"), study.result)
 
 

@@ -11,7 +11,11 @@ from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.registry import MODELS, find_model
 from hose_mj.recording.episode import HoseTrack, Scene, Series
 from hose_mj.recording.palette import find_color
-from hose_mj.recording.plots import api as plots
+from hose_mj.recording.plots.curves import plot_convergence, plot_series
+from hose_mj.recording.plots.shapes import Fan, plot_fan, plot_shapes
+from hose_mj.recording.plots.statics import ErrorPoint, plot_errors
+from hose_mj.recording.plots.style import choose_length_unit, format_seconds
+from hose_mj.recording.plots.work import Gap, WorkPoint, plot_overview, plot_work_precision
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import RunResult
 from hose_mj.validation.study import SHOWN_WITHIN, Study
@@ -43,13 +47,19 @@ def draw_all(study: Study) -> Pictures:
     for result in study.results:
         if result.case.motion is not None and result.outcomes:
             pictures.update(_draw_motion(result, study))
-            if result.case.id == HERO and _has_hero_models(result):
+            models = {outcome.setting.model for outcome in result.outcomes}
+            if result.case.id == HERO and models & {"geds", "cable"}:
                 pictures["overview"] = draw_overview(result, study)
     for family, members in group_statics(study.results).items():
         pictures.update(_draw_statics(family, members))
     pictures.update(_draw_numerics(study))
     if study.user is not None and study.user.hose.duration is None and study.outcomes:
-        pictures.update(_draw_rest(study.results[0], study.shown_within))
+        # The rest shape that each model finds where it comes closest.
+        result = study.results[0]
+        shown = choose_shown(result, study.shown_within).values()
+        curves = {describe_setting(outcome): outcome.points for outcome in shown}
+        picture = plot_shapes(result.case.title, curves, choose_plane(curves.values()))
+        pictures[f"{result.case.id}-shapes"] = picture
     return pictures
 
 
@@ -82,22 +92,15 @@ def compute_distance(one: RunResult, other: RunResult) -> np.ndarray:
 def name_setting(outcome: RunResult) -> str:
     """Resolution and time step, short: "12, 2.5 ms"."""
     setting = outcome.setting
-    step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
+    step = "" if setting.timestep is None else f", {format_seconds(setting.timestep)}"
     return f"{setting.resolution}{step}"
 
 
 def describe_setting(outcome: RunResult) -> str:
     """A model at a setting, for legends: "geds, 12 control points, 2.5 ms"."""
-    setting = outcome.setting
-    size = find_model(setting.model).resolution.replace("_", " ")
-    step = "" if setting.timestep is None else f", {plots.format_seconds(setting.timestep)}"
-    return f"{setting.model}, {setting.resolution} {size}{step}"
-
-
-def name_series(outcome: RunResult) -> str:
-    """Model id, or "geds planar" for GEDS in a plane."""
-    setting = outcome.setting
-    return "geds planar" if setting.model == "geds" and setting.planar else setting.model
+    size = find_model(outcome.setting.model).resolution.replace("_", " ")
+    resolution, comma, step = name_setting(outcome).partition(",")
+    return f"{outcome.setting.model}, {resolution} {size}{comma}{step}"
 
 
 def choose_ratios(ratios: Iterable[Ratio], case_id: str) -> list[Ratio]:
@@ -126,38 +129,31 @@ def draw_overview(result: CaseResult, study: Study) -> bytes:
             f"At {level} error the cable takes {factor} as long"
             "\nbest settings of each model; labels: control points or segments, time step"
         )
-    return plots.plot_overview(curves, times, _list_work(result, study), gaps, (left, right))
+    return plot_overview(curves, times, _list_work(result, study), gaps, (left, right))
 
 
-def _has_hero_models(result: CaseResult) -> bool:
-    return any(outcome.setting.model in ("geds", "cable") for outcome in result.outcomes)
-
-
-def _ratio_of(gap: plots.Gap) -> float:
+def _ratio_of(gap: Gap) -> float:
     return gap.cost_against / gap.cost
 
 
-def _list_work(result: CaseResult, study: Study) -> list[plots.WorkPoint]:
+def _list_work(result: CaseResult, study: Study) -> list[WorkPoint]:
     """A point for each run, and for each committed one of the cable where it cannot run."""
-    points = [
-        plots.WorkPoint(
-            name_series(outcome),
-            name_setting(outcome),
-            outcome.error,
-            outcome.wall_s_per_sim_s or np.nan,
-            outcome.setting.clamp_corrected,
-        )
-        for outcome in result.outcomes
-    ]
+    points = []
+    for o in result.outcomes:
+        # GEDS in a plane is a series of its own.
+        model, cost = o.setting.model, o.wall_s_per_sim_s or np.nan
+        series = "geds planar" if model == "geds" and o.setting.planar else model
+        clamp = o.setting.clamp_corrected
+        points.append(WorkPoint(series, name_setting(o), o.error, cost, clamp))
     for record in study.committed.records if study.committed else ():
         if record["case"] == result.case.id and record["timestep"] is not None:
-            label = f"{record['resolution']}, {plots.format_seconds(record['timestep'])}"
+            label = f"{record['resolution']}, {format_seconds(record['timestep'])}"
             cost, clamp = record["wall_s_per_sim_s"], record["clamp_corrected"]
-            points.append(plots.WorkPoint(COMMITTED, label, record["error"], cost, clamp))
+            points.append(WorkPoint(COMMITTED, label, record["error"], cost, clamp))
     return points
 
 
-def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[plots.Gap]:
+def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[Gap]:
     """The arrows of a picture: above a level the cable's, below it the hinge chain's."""
     costs = {outcome.setting.label: outcome.wall_s_per_sim_s for outcome in result.outcomes}
     gaps = []
@@ -166,7 +162,7 @@ def _list_gaps(result: CaseResult, ratios: Iterable[Ratio]) -> list[plots.Gap]:
             continue
         cost, against = costs.get(ratio.model_setting), costs.get(ratio.against_setting)
         if cost is not None and against is not None:
-            gaps.append(plots.Gap(ratio.at_error, ratio.against, cost, against))
+            gaps.append(Gap(ratio.at_error, ratio.against, cost, against))
     return gaps
 
 
@@ -181,7 +177,7 @@ def _pick_snapshots(shown: dict[str, RunResult]) -> tuple[dict[str, np.ndarray],
 def _draw_motion(result: CaseResult, study: Study) -> Pictures:
     case = result.case
     pictures = {
-        f"{case.id}-work-precision": plots.plot_work_precision(
+        f"{case.id}-work-precision": plot_work_precision(
             case.title, _list_work(result, study), _list_gaps(result, study.ratios)
         )
     }
@@ -189,20 +185,14 @@ def _draw_motion(result: CaseResult, study: Study) -> Pictures:
     curves, times = _pick_snapshots(shown)
     plane = choose_plane(curves.values())
     outlines = compute_outlines(case.obstacles, plane)
-    pictures[f"{case.id}-shapes"] = plots.plot_shapes(case.title, curves, plane, times, outlines)
+    pictures[f"{case.id}-shapes"] = plot_shapes(case.title, curves, plane, times, outlines)
     if "geds" in shown and len(shown) > 1:
-        pictures[f"{case.id}-distance"] = _draw_distance(shown)
+        gaps, unit = _measure_gaps(shown)
+        title = f"Largest distance from GEDS {name_setting(shown['geds'])}"
+        t = shown["geds"].times
+        series = {f"{m} {name_setting(shown[m])}": (t, gap) for m, gap in gaps.items()}
+        pictures[f"{case.id}-distance"] = plot_series(title, f"distance ({unit})", series)
     return pictures
-
-
-def _draw_rest(result: CaseResult, within: float) -> Pictures:
-    """The rest shape that each model finds where it comes closest."""
-    curves = {
-        describe_setting(outcome): outcome.points
-        for outcome in choose_shown(result, within).values()
-    }
-    picture = plots.plot_shapes(result.case.title, curves, choose_plane(curves.values()))
-    return {f"{result.case.id}-shapes": picture}
 
 
 def choose_plane(curves: Iterable[np.ndarray]) -> tuple[int, int]:
@@ -217,23 +207,13 @@ def _measure_gaps(shown: dict[str, RunResult]) -> tuple[dict[str, np.ndarray], s
     """Distances from GEDS over time by model, in a unit that suits the largest; and that unit."""
     gaps = {m: compute_distance(shown["geds"], o) for m, o in shown.items() if m != "geds"}
     largest = max((float(gap.max()) for gap in gaps.values()), default=0.0)
-    unit, factor = plots.choose_length_unit(largest)
+    unit, factor = choose_length_unit(largest)
     return {model: factor * gap for model, gap in gaps.items()}, unit
-
-
-def _draw_distance(shown: dict[str, RunResult]) -> bytes:
-    ours = shown["geds"]
-    gaps, unit = _measure_gaps(shown)
-    return plots.plot_series(
-        f"Largest distance from GEDS {name_setting(ours)}",
-        f"distance ({unit})",
-        {f"{m} {name_setting(shown[m])}": (ours.times, gap) for m, gap in gaps.items()},
-    )
 
 
 def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
     points = [
-        plots.ErrorPoint(
+        ErrorPoint(
             outcome.setting.model,
             _parameter(result) if len(members) > 1 else "",
             outcome.setting.resolution,
@@ -247,7 +227,7 @@ def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
         return {}
     title = members[0].case.title if len(members) == 1 else family.replace("-", " ").capitalize()
     of = "reference" if members[0].case.scale is None else "length"
-    pictures = {family: plots.plot_errors(title, points, f"error (of the {of})")}
+    pictures = {family: plot_errors(title, points, f"error (of the {of})")}
     case = members[0].case
     if case.obstacles or not case.planar:
         ours = max(members[0].outcomes, key=lambda outcome: outcome.setting.resolution)
@@ -257,16 +237,14 @@ def _draw_statics(family: str, members: list[CaseResult]) -> Pictures:
         if across[1] > 0.01 * across[2]:  # a straight line is no picture
             outlines = compute_outlines(case.obstacles, plane)
             curves = {describe_setting(ours): curve}
-            pictures[f"{family}-shapes"] = plots.plot_shapes(
-                title, curves, plane, outlines=outlines
-            )
+            pictures[f"{family}-shapes"] = plot_shapes(title, curves, plane, outlines=outlines)
     if family in FANS and len(members) > 1:
         fans = [_make_fan(members, "geds", None), _make_fan(members, "cable", False)]
-        pictures[f"{family}-shapes"] = plots.plot_fan(title, [fan for fan in fans if fan])
+        pictures[f"{family}-shapes"] = plot_fan(title, [fan for fan in fans if fan])
     return pictures
 
 
-def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> plots.Fan | None:
+def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> Fan | None:
     """Equilibria of a model: GEDS at its finest, a chain at about 20 segments as documented."""
     curves: dict[str, np.ndarray] = {}
     resolution = 0
@@ -277,19 +255,17 @@ def _make_fan(members: list[CaseResult], model: str, corrected: bool | None) -> 
             if (outcome.setting.model, outcome.setting.clamp_corrected) == (model, corrected)
         ]
         if mine:
-            best = min(mine, key=lambda o: o.error if corrected is None else _far_from_20(o))
+            about_20 = [abs(outcome.setting.resolution - 20.0) for outcome in mine]
+            ranks = about_20 if corrected is not None else [outcome.error for outcome in mine]
+            best = mine[ranks.index(min(ranks))]
             curves[_parameter(result)] = best.points[0]
             resolution = best.setting.resolution
     if not curves:
         return None
     if corrected is None:
-        return plots.Fan(model, curves)
+        return Fan(model, curves)
     name = f"{model}, {resolution} segments, clamp as documented"
-    return plots.Fan(name, curves, dotted=True)
-
-
-def _far_from_20(outcome: RunResult) -> int:
-    return abs(outcome.setting.resolution - 20)
+    return Fan(name, curves, dotted=True)
 
 
 def _parameter(result: CaseResult) -> str:
@@ -303,20 +279,18 @@ def _draw_numerics(study: Study) -> Pictures:
     pictures: Pictures = {}
     for title, curves in study.curves.items():
         if title.startswith("Wall"):
-            pictures["cost"] = plots.plot_convergence(
+            pictures["cost"] = plot_convergence(
                 title, "control points", curves, (1.0,), ylabel="wall time", in_seconds=True
             )
             continue
         slopes = (4.0,) if "frequencies" in title else (3.0,) if "swing" in title else (1.0, 2.0)
         xlabel = "time step (s)" if "time step" in title else "span length (m)"
         name = title.lower().replace(" ", "-")
-        pictures[name] = plots.plot_convergence(
-            title, xlabel, curves, slopes, finer_is_larger=False
-        )
+        pictures[name] = plot_convergence(title, xlabel, curves, slopes, finer_is_larger=False)
     if study.energy is not None:
         times, energies = study.energy
         change = 100.0 * (np.asarray(energies) - 1.0)
-        pictures["energy"] = plots.plot_series(
+        pictures["energy"] = plot_series(
             "Energy of the released rod over ten seconds, BDF2 at 5 ms",
             "change of energy (% of its start)",
             {"geds, 12 points": (times, change)},

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 from hose_mj.validation.compare import find_cheapest
 from hose_mj.validation.run import RunResult
@@ -61,21 +62,14 @@ def list_answers(
     if any(outcome.setting.planar for outcome in outcomes):
         kinds.insert(1, ("geds", True))
     answers = []
+    found: tuple[Any, ...]
     for at_error in errors:
         for model, planar in kinds:
-            best = _choose_best(outcomes, model, at_error, planar)
-            answer = Answer(at_error, model, planar)
+            best, found = _choose_best(outcomes, model, at_error, planar), ()
             if best is not None:
-                setting = best.setting
-                answer = replace(
-                    answer,
-                    setting=setting.label,
-                    resolution=setting.resolution,
-                    timestep=setting.timestep,
-                    error=best.error,
-                    wall_s_per_sim_s=best.wall_s_per_sim_s,
-                )
-            answers.append(answer)
+                at = best.setting
+                found = (at.label, at.resolution, at.timestep, best.error, best.wall_s_per_sim_s)
+            answers.append(Answer(at_error, model, planar, *found))
     return answers
 
 
@@ -86,10 +80,8 @@ def _choose_best(
     if any(outcome.sim_s is not None for outcome in outcomes):
         return find_cheapest(outcomes, model, at_error, planar=planar)
     by_size = sorted(outcomes, key=lambda outcome: outcome.setting.resolution)
-    for outcome in by_size:
-        if find_cheapest([outcome], model, at_error, planar=planar) is not None:
-            return outcome
-    return None
+    found = (find_cheapest([outcome], model, at_error, planar=planar) for outcome in by_size)
+    return next(filter(None, found), None)
 
 
 def list_disagreements(outcomes: list[RunResult], length: float) -> list[Disagreement]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -16,7 +17,6 @@ from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.registry import make_hose
-from hose_mj.scenes.hose_file.grasps import Grasp
 from hose_mj.scenes.hose_file.hose_file import UserHose
 from hose_mj.validation.case import Case, Motion
 
@@ -82,10 +82,7 @@ def make_case(user: UserHose) -> Case:
         probe=probe,
         scale=user.spec.length,
         motion=None if user.duration is None else _make_motion(user, user.duration),
-        clamped=any(
-            hold.tangent is not None and hold.arc_length in (0.0, user.spec.length)
-            for hold in user.holds
-        ),
+        clamped=any(h.tangent and h.arc_length in (0.0, user.spec.length) for h in user.holds),
         planar=planar,
         obstacles=make_obstacles(user),
     )
@@ -98,7 +95,9 @@ def starts_at_rest(user: UserHose) -> bool:
 
 def compute_fineness(user: UserHose) -> int:
     """Returns the factor by which a hose is resolved finer: two turns of a coil count as one."""
-    return max(1, math.ceil(count_turns(user) / 2.0))
+    curvature, torsion = user.spec.rest_curvature, user.spec.rest_torsion
+    turns = math.hypot(curvature, torsion) * user.spec.length / math.tau
+    return max(1, math.ceil(turns / 2.0)) if curvature else 1
 
 
 def make_obstacles(user: UserHose) -> tuple[Obstacle, ...]:
@@ -125,21 +124,21 @@ def put(user: UserHose, hose: HoseModel, line: Line) -> list[Hold]:
         hose.reset(line, director=choose_director(user, line))
     else:
         hose.reset(line)
-    holds = [_hold(hose, place) for place in user.holds]
+    holds = []
+    for place in user.holds:
+        if place.tangent is None:
+            holds.append(hose.attach(place.arc_length, place.position))
+        elif isinstance(hose, GedsHose) and place.director is not None:
+            facts = (place.arc_length, place.position, place.tangent, place.director)
+            holds.append(hose.clamp(*facts))
+        else:
+            holds.append(hose.clamp(place.arc_length, place.position, place.tangent))
     for load in user.loads:
         if any(load.force):
             hose.apply_force(load.arc_length, load.force)
         if any(load.moment):
             hose.apply_moment(load.arc_length, load.moment)
     return holds
-
-
-def _hold(hose: HoseModel, place: Grasp) -> Hold:
-    if place.tangent is None:
-        return hose.attach(place.arc_length, place.position)
-    if isinstance(hose, GedsHose) and place.director is not None:
-        return hose.clamp(place.arc_length, place.position, place.tangent, place.director)
-    return hose.clamp(place.arc_length, place.position, place.tangent)
 
 
 def compute_rest_shape(user: UserHose) -> Line:
@@ -163,11 +162,8 @@ def compute_rest_shape(user: UserHose) -> Line:
         return np.asarray(start(s) + aside[:, None] * np.array([0.1, 1.0, 0.1]))
 
     points = REST_POINTS * compute_fineness(user)
-    options = {
-        "gravity": user.gravity,
-        "control_points": points,
-        "obstacles": make_obstacles(user),
-    }
+    options: dict[str, Any] = {"gravity": user.gravity, "control_points": points}
+    options["obstacles"] = make_obstacles(user)
     loose = make_hose("geds", thick, timestep=0.1 / pace, scheme="backward-euler", **options)
     hose = make_hose("geds", spec, **options)
     try:
@@ -202,10 +198,11 @@ def describe(user: UserHose) -> str:
         f"EA = {spec.axial_stiffness:.3g} N, EI = {spec.bending_stiffness:.3g} N m\u00b2, "
         f"GJ = {spec.torsional_stiffness:.3g} N m\u00b2."
     ]
-    kinds = [
-        f"{'clamped' if hold.tangent else 'attached'}{_name_changes(hold)} at {hold.arc_length:g} m"
-        for hold in user.holds
-    ]
+    kinds = []
+    for hold in user.holds:
+        words = ["clamped" if hold.tangent else "attached"]
+        words += [word for word, some in (("moved", hold.moves), ("turned", hold.spins)) if some]
+        kinds.append(f"{' and '.join(words)} at {hold.arc_length:g} m")
     parts.append(f"It is {' and '.join(kinds)}." if kinds else "Nothing holds it.")
     if user.duration is None:
         parts.append("Compared: its shape at rest.")
@@ -213,11 +210,6 @@ def describe(user: UserHose) -> str:
         start = "at rest" if user.start == "equilibrium" else "as laid"
         parts.append(f"It starts {start}; compared: its places over {user.duration:g} s.")
     return " ".join(parts)
-
-
-def _name_changes(hold: Grasp) -> str:
-    words = [word for word, some in (("moved", hold.moves), ("turned", hold.spins)) if some]
-    return f" and {' and '.join(words)}" if words else ""
 
 
 def _make_motion(user: UserHose, duration: float) -> Motion:
@@ -266,14 +258,6 @@ def make_line(user: UserHose) -> Line:
     s = np.concatenate([pieces[0][0][:1], *(piece[0][1:] for piece in pieces)])
     points = np.concatenate([pieces[0][1][:1], *(piece[1][1:] for piece in pieces)])
     return _interpolate(s, points)
-
-
-def count_turns(user: UserHose) -> float:
-    """Turns of the coil that a hose is at rest; 0 for one that is straight then."""
-    spec = user.spec
-    if spec.rest_curvature == 0.0:
-        return 0.0
-    return math.hypot(spec.rest_curvature, spec.rest_torsion) * spec.length / math.tau
 
 
 def choose_director(user: UserHose, line: Line) -> Array:
@@ -356,7 +340,10 @@ def bend_between(ends: list[Array], tangents: list[Array], length: float, gravit
 
 
 def _choose_tangents(user: UserHose) -> list[Array]:
-    """Unit tangents: of clamps as given, of attachments along the chord of their neighbours."""
+    """Unit tangents: of clamps as given, of attachments along the chord of their neighbours.
+
+    An attachment without neighbours hangs along gravity, or lies along x.
+    """
     tangents = []
     for k, hold in enumerate(user.holds):
         near = user.holds[max(k - 1, 0) : k + 2]
@@ -365,18 +352,13 @@ def _choose_tangents(user: UserHose) -> list[Array]:
             tangents.append(np.array(hold.tangent))
         elif np.linalg.norm(chord) > 1e-9 * user.spec.length:
             tangents.append(chord / np.linalg.norm(chord))
+        elif size := np.linalg.norm(user.gravity):
+            # Down, or up where most of the hose is before it.
+            sign = 1.0 if hold.arc_length <= 0.5 * user.spec.length else -1.0
+            tangents.append(np.asarray(sign * np.array(user.gravity) / size))
         else:
-            tangents.append(_hang(user, hold.arc_length))
+            tangents.append(_AXES[0])
     return tangents
-
-
-def _hang(user: UserHose, arc_length: float) -> Array:
-    """Returns the tangent at an attachment: down, up where most of the hose is before it, or x."""
-    size = np.linalg.norm(user.gravity)
-    if size == 0.0:
-        return np.array([1.0, 0.0, 0.0])
-    sign = 1.0 if arc_length <= 0.5 * user.spec.length else -1.0
-    return np.asarray(sign * np.array(user.gravity) / size)
 
 
 def _choose_side(chord: Array, tangents: list[Array], gravity: Array) -> Array:

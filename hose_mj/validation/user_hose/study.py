@@ -274,11 +274,11 @@ def _run_motion(
     ladders.sort(key=lambda ladder: _rank(ladder[0], grid.dynamic))
     fastest = max((spin.fastest for hold in user.holds for spin in hold.spins), default=0.0)
     for whole in ladders:
-        ladder = [setting for setting in whole if can_spin(setting, fastest)]
+        # A chain's clamp turns by less than half in a step: see `HoseModel.move`.
+        ladder = [s for s in whole if s.model == "geds" or fastest * (s.timestep or 0.0) < math.pi]
         if not ladder:
-            result.skipped.append(
-                Skipped(CASE_ID, whole[-1], "a clamp turns by half and more in a step")
-            )
+            why = "a clamp turns by half and more in a step"
+            result.skipped.append(Skipped(CASE_ID, whole[-1], why))
             continue
         setting = ladder[0]
         advance(f"{setting.model}, {setting.resolution}")
@@ -306,15 +306,10 @@ def _rank(setting: Setting, resolutions: Mapping[str, tuple[int, ...]]) -> tuple
 
 def _count_enough(outcomes: list[RunResult], like: Setting, error: float) -> int:
     """Resolutions of one model, scheme and clamp that are within an error."""
+    within = [outcome.setting for outcome in outcomes if outcome.error <= error]
     kind = (like.model, like.scheme, like.clamp_corrected)
-    return len(
-        {
-            o.setting.resolution
-            for o in outcomes
-            if o.error <= error
-            and (o.setting.model, o.setting.scheme, o.setting.clamp_corrected) == kind
-        }
-    )
+    found = {s.resolution for s in within if (s.model, s.scheme, s.clamp_corrected) == kind}
+    return len(found)
 
 
 def make_grid(user: UserHose) -> Grid:
@@ -325,12 +320,6 @@ def make_grid(user: UserHose) -> Grid:
         return {**resolutions, "geds": geds}
 
     return replace(GRID, static=refine(GRID.static), dynamic=refine(GRID.dynamic))
-
-
-def can_spin(setting: Setting, rate: float) -> bool:
-    """Says whether a clamp may turn so fast (rad/s) in this setting: see `HoseModel.move`."""
-    assert setting.timestep is not None
-    return setting.model == "geds" or rate * setting.timestep < math.pi
 
 
 def list_halving_steps(
@@ -371,9 +360,8 @@ def check_supported(user: UserHose, model: str) -> None:
     try:
         hose = make_hose(model, user.spec, gravity=user.gravity, timestep=1e-3, **options)
     except InputError as error:
-        raise InputError(
-            f"hose.{error.thing}", error.value, f"for {model} {error.valid}"
-        ) from error
+        valid = f"for {model} {error.valid}"
+        raise InputError(f"hose.{error.thing}", error.value, valid) from error
     if user.spins:
         try:
             hose.move(hose.clamp(0.0), spin=_SOME_SPIN)

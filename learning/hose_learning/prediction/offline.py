@@ -57,7 +57,7 @@ class PublishedTable:
 
 def read_table(task: str) -> PublishedTable | None:
     """Returns the table about a task, None where there is none."""
-    text = files("hose_learning").joinpath("published.json").read_text(encoding="utf-8")
+    text = files("hose_learning.prediction").joinpath("published.json").read_text(encoding="utf-8")
     for table in json.loads(text)["tables"]:
         if table["task"] == task:
             agents = tuple(

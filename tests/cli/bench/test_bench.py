@@ -8,9 +8,9 @@ import json
 import pytest
 
 from hose_mj.checks import Check
+from hose_mj.cli import bench
 from hose_mj.cli import main as cli
 from hose_mj.cli.bench import Bench, Record, measure_rate
-from hose_mj.cli.bench import command as bench
 from hose_mj.cli.bench import env as bench_env
 from hose_mj.cli.bench import hose as bench_hose
 from hose_mj.cli.bench import learn as bench_learn

@@ -7,11 +7,30 @@ import pytest
 
 from hose_mj.errors import InputError
 from hose_mj.recording.palette import COLORS, find_model, lighten, name_model
-from hose_mj.recording.plots import api as plots
+from hose_mj.recording.plots.curves import measure_order, plot_convergence, plot_series
 from hose_mj.recording.plots.labels import Label, label_points, spread_apart
-from hose_mj.recording.plots.shapes import choose_label_point, choose_size, group_places
-from hose_mj.recording.plots.statics import shade
-from hose_mj.recording.plots.style import format_percent, format_seconds, make_axes
+from hose_mj.recording.plots.shapes import (
+    Fan,
+    choose_label_point,
+    choose_size,
+    group_places,
+    plot_fan,
+    plot_shapes,
+)
+from hose_mj.recording.plots.statics import ErrorPoint, plot_errors, shade
+from hose_mj.recording.plots.style import (
+    choose_length_unit,
+    format_percent,
+    format_seconds,
+    make_axes,
+)
+from hose_mj.recording.plots.work import (
+    Gap,
+    WorkPoint,
+    compute_pareto_front,
+    plot_overview,
+    plot_work_precision,
+)
 
 TIMES = np.linspace(0.0, 1.0, 20)
 MODELS = ("geds", "cable", "flex", "hinge-chain")
@@ -20,14 +39,14 @@ CONVERGENCE = {m: (np.array([8, 16, 32]), (i + 1) * np.array([8, 16, 32.0]) ** -
 SHAPES = {m: np.stack([TIMES, 0 * TIMES, i * TIMES**2], axis=1) for i, m in enumerate(MODELS)}
 SERIES = {m: (TIMES, np.sin(3 * TIMES) + i) for i, m in enumerate(MODELS)}
 WORK = [
-    plots.WorkPoint(model, str(n), (i + 1) / n**2, 0.01 * n * (i + 1), corrected)
+    WorkPoint(model, str(n), (i + 1) / n**2, 0.01 * n * (i + 1), corrected)
     for i, model in enumerate(MODELS)
     for n in (10, 20, 40)
     for corrected in ((None,) if model == "geds" else (True, False))
 ]
-GAPS = [plots.Gap(1e-2, "cable", 0.1, 2.0), plots.Gap(1e-3, "hinge-chain", 0.1, 0.5)]
+GAPS = [Gap(1e-2, "cable", 0.1, 2.0), Gap(1e-3, "hinge-chain", 0.1, 0.5)]
 ERRORS = [
-    plots.ErrorPoint(model, f"\u0393 = {gamma}", n, gamma * (i + 1) / n**2, corrected)
+    ErrorPoint(model, f"\u0393 = {gamma}", n, gamma * (i + 1) / n**2, corrected)
     for i, model in enumerate(MODELS)
     for gamma in (1, 2, 3)
     for n in (10, 20, 40)
@@ -35,18 +54,18 @@ ERRORS = [
 ]
 SWINGS = {m: np.stack([p, p + np.array([0, 0, 0.3])]) for m, p in SHAPES.items()}
 FANS = [
-    plots.Fan(m, {"\u0393 = 1": SHAPES[m], "\u0393 = 2": 0.5 * SHAPES[m]}, dotted=m != "geds")
+    Fan(m, {"\u0393 = 1": SHAPES[m], "\u0393 = 2": 0.5 * SHAPES[m]}, dotted=m != "geds")
     for m in MODELS
 ]
 DRAWINGS = {
-    "work": lambda: plots.plot_work_precision("t", WORK, GAPS),
-    "convergence": lambda: plots.plot_convergence("t", "n", CONVERGENCE, slopes=(2,)),
-    "shapes": lambda: plots.plot_shapes("t", SHAPES),
-    "cost": lambda: plots.plot_convergence("t", "n", CONVERGENCE, (1,), in_seconds=True),
-    "series": lambda: plots.plot_series("t", "y", SERIES, limits={"bound": 2.0}),
-    "series-log": lambda: plots.plot_series("t", "y", SERIES, logy=True),
-    "statics": lambda: plots.plot_errors("t", ERRORS),
-    "fan": lambda: plots.plot_fan("t", FANS),
+    "work": lambda: plot_work_precision("t", WORK, GAPS),
+    "convergence": lambda: plot_convergence("t", "n", CONVERGENCE, slopes=(2,)),
+    "shapes": lambda: plot_shapes("t", SHAPES),
+    "cost": lambda: plot_convergence("t", "n", CONVERGENCE, (1,), in_seconds=True),
+    "series": lambda: plot_series("t", "y", SERIES, limits={"bound": 2.0}),
+    "series-log": lambda: plot_series("t", "y", SERIES, logy=True),
+    "statics": lambda: plot_errors("t", ERRORS),
+    "fan": lambda: plot_fan("t", FANS),
 }
 
 
@@ -77,22 +96,22 @@ def test_the_same_data_give_the_same_bytes():
 
 
 def test_values_that_a_log_axis_cannot_show_do_not_break_it():
-    points = [*WORK, plots.WorkPoint("cable", "80", 0.0, 1.0), plots.WorkPoint("x", "1", 1.0, 0.0)]
-    plots.plot_work_precision("t", points)
-    plots.plot_errors("t", [plots.ErrorPoint("geds", "", 8, 0.0)])
-    plots.plot_errors("t", [*ERRORS, plots.ErrorPoint("cable", "", 8, 0.0, False)])
-    plots.plot_convergence("t", "n", {"geds": ([8, 16], [0.0, 0.0]), "cable": ([8], [0.1])})
-    plots.plot_series("t", "y", {"geds": ([0.0, 1.0], [0.0, 0.0])}, logy=True)
-    plots.plot_series("t", "y", {"geds": ([0.0], [1.0])})
+    points = [*WORK, WorkPoint("cable", "80", 0.0, 1.0), WorkPoint("x", "1", 1.0, 0.0)]
+    plot_work_precision("t", points)
+    plot_errors("t", [ErrorPoint("geds", "", 8, 0.0)])
+    plot_errors("t", [*ERRORS, ErrorPoint("cable", "", 8, 0.0, False)])
+    plot_convergence("t", "n", {"geds": ([8, 16], [0.0, 0.0]), "cable": ([8], [0.1])})
+    plot_series("t", "y", {"geds": ([0.0, 1.0], [0.0, 0.0])}, logy=True)
+    plot_series("t", "y", {"geds": ([0.0], [1.0])})
 
 
 def test_snapshots_fade_and_carry_their_times():
-    assert plots.plot_shapes("t", SWINGS, times=(0.0, 0.5)) != plots.plot_shapes("t", SWINGS)
+    assert plot_shapes("t", SWINGS, times=(0.0, 0.5)) != plot_shapes("t", SWINGS)
 
 
 def test_the_overview_has_the_size_that_the_readme_wants():
     swings = {m: SWINGS[m] for m in ("geds", "cable")}
-    png = plots.plot_overview(swings, (0.0, 0.5), WORK, GAPS, ("left\nsmall", "right"))
+    png = plot_overview(swings, (0.0, 0.5), WORK, GAPS, ("left\nsmall", "right"))
     pixels = read_pixels(png)
     assert pixels.shape[:2] == (700, 1600)
     for model in ("geds", "cable"):
@@ -101,7 +120,7 @@ def test_the_overview_has_the_size_that_the_readme_wants():
 
 
 def test_a_gap_adds_an_arrow():
-    assert plots.plot_work_precision("t", WORK, GAPS) != plots.plot_work_precision("t", WORK)
+    assert plot_work_precision("t", WORK, GAPS) != plot_work_precision("t", WORK)
 
 
 def test_labels_keep_off_each_other_and_off_the_edge():
@@ -146,19 +165,19 @@ def test_quantities_have_units_that_suit_them():
         *("2 s", "833 \u00b5s", "2.5 ms", "0.1 ns")
     ]
     assert format_percent(1e-3) == "0.1 %"
-    assert plots.choose_length_unit(0.02) == ("mm", 1e3)
-    assert plots.choose_length_unit(2.0) == ("m", 1.0)
+    assert choose_length_unit(0.02) == ("mm", 1e3)
+    assert choose_length_unit(2.0) == ("m", 1.0)
 
 
 def test_the_pareto_front_has_no_beaten_point():
     cost, error = np.array([1.0, 2.0, 2.0, 3.0, 4.0]), np.array([5.0, 4.0, 6.0, 4.5, 1.0])
-    assert plots.compute_pareto_front(cost, error).tolist() == [0, 1, 4]
+    assert compute_pareto_front(cost, error).tolist() == [0, 1, 4]
 
 
 def test_the_order_of_an_exact_power_law_is_measured():
     x = np.array([8.0, 16.0, 64.0])
-    assert plots.measure_order(x, 7.0 * x**-4) == pytest.approx(-4.0)
-    assert plots.measure_order(x[:1], x[:1]) is None
+    assert measure_order(x, 7.0 * x**-4) == pytest.approx(-4.0)
+    assert measure_order(x[:1], x[:1]) is None
 
 
 def test_labels_are_spread_as_little_as_possible():
@@ -170,14 +189,14 @@ def test_labels_are_spread_as_little_as_possible():
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: plots.plot_work_precision("t", []),
-        lambda: plots.plot_convergence("t", "n", {"a": ([1, 2], [1])}),
-        lambda: plots.plot_shapes("t", {"a": np.zeros((3, 2))}),
-        lambda: plots.plot_shapes("t", {"a": np.full((3, 3), np.nan)}),
-        lambda: plots.plot_series("t", "y", {}),
-        lambda: plots.plot_errors("t", []),
-        lambda: plots.plot_fan("t", []),
-        lambda: plots.plot_overview({}, (), WORK, GAPS, ("", "")),
+        lambda: plot_work_precision("t", []),
+        lambda: plot_convergence("t", "n", {"a": ([1, 2], [1])}),
+        lambda: plot_shapes("t", {"a": np.zeros((3, 2))}),
+        lambda: plot_shapes("t", {"a": np.full((3, 3), np.nan)}),
+        lambda: plot_series("t", "y", {}),
+        lambda: plot_errors("t", []),
+        lambda: plot_fan("t", []),
+        lambda: plot_overview({}, (), WORK, GAPS, ("", "")),
     ],
 )
 def test_bad_input_is_refused(draw):
@@ -187,4 +206,4 @@ def test_bad_input_is_refused(draw):
 
 def test_outlines_are_drawn_and_seen_whole():
     square = np.array([[0.0, -3.0], [1.0, -3.0], [1.0, -2.0], [0.0, -2.0]])
-    assert plots.plot_shapes("t", SHAPES, outlines=[square]) != plots.plot_shapes("t", SHAPES)
+    assert plot_shapes("t", SHAPES, outlines=[square]) != plot_shapes("t", SHAPES)

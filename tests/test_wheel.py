@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -13,7 +14,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 
-pytest.importorskip("hatchling", reason="builds with hatchling (extra dev)")
+for module in ("hatchling", "hatch_fancy_pypi_readme"):
+    pytest.importorskip(module, reason=f"builds with {module} (extra dev)")
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +49,20 @@ def test_every_asset_is_inside(wheel):
         ["git", "ls-files", "assets"], cwd=ROOT, capture_output=True, text=True
     ).stdout.split()
     assert {f"hose_mj/{name}" for name in listed} <= names
+
+
+def test_the_description_works_outside_the_repository(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (metadata,) = (archive.read(n) for n in archive.namelist() if n.endswith("/METADATA"))
+    description = metadata.decode().partition("\n\n")[2]
+    prose = re.sub(r"```.*?```|`[^`\n]*`", "", description, flags=re.S)
+    targets = re.findall(r"\]\(([^)\s]*)|\b(?:src|href)=[\"']([^\"']*)", prose)
+    assert len(targets) > 20
+    assert not [t for pair in targets for t in pair if t and not re.match("https?://|mailto:|#", t)]
+    pictures = re.findall(r"!\[[^\]]*\]\(([^)\s]*)", prose)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(pictures) == readme.count("![")
+    assert all("/raw/" in picture for picture in pictures)
 
 
 def test_the_materials_are_found_in_the_wheel(wheel, tmp_path):

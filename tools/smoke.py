@@ -26,7 +26,6 @@ SPEC = HoseSpec.from_material(
     density=600.0,
     outer_radius=0.005,
     damping_time=0.02,
-    drag=0.015,
 )
 
 

@@ -8,12 +8,15 @@ is the installation beside other people's packages. The table goes into docs/ins
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,25 +27,55 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 MUJOCOS = ("mujoco==3.17.*", "mujoco>=4,<5")
 NEIGHBOURS = ("mjlab==1.6.*", "newton[sim]==1.8.*")
 MOST_MEGABYTES = 550
-"""What a core installation may take."""
+"""What a core installation may add to an empty environment, in 2^20 bytes of disk."""
 PIP = ("-m", "pip", "--disable-pip-version-check", "--quiet", "--no-input")
 
 
 class Row(NamedTuple):
-    """One line of the table."""
+    """One line of the table: seconds on the wall, and of the processors."""
 
     python: str
     beside: str
     what: str
     status: str
     seconds: float
+    busy: float
     megabytes: float | None = None
 
     def format(self) -> str:
         """Returns the row in Markdown."""
         size = "" if self.megabytes is None else f"{self.megabytes:.0f}"
-        cells = (self.python, self.beside, self.what, self.status, f"{self.seconds:.0f}", size)
+        times = (f"{self.seconds:.0f}", f"{self.busy:.0f}")
+        cells = (self.python, f"`{self.beside}`", self.what, self.status, *times, size)
         return f"| {' | '.join(cells)} |"
+
+
+class Runs:
+    """Runs programs one after the other until one fails; adds up what they take."""
+
+    def __init__(self) -> None:
+        self.begun = time.perf_counter()
+        self.busy = 0.0
+        self.failure = ""
+
+    def run(self, words: list[str], cwd: Path | None = None) -> None:
+        """Runs a program, unless one has failed; keeps the last line of one that fails."""
+        if self.failure:
+            return
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as said:
+            child = subprocess.Popen(words, cwd=cwd, stdout=said, stderr=subprocess.STDOUT)
+            _, status, used = os.wait4(child.pid, 0)
+            child.returncode = os.waitstatus_to_exitcode(status)
+            said.seek(0)
+            lines = [line.strip() for line in said if line.strip()] or [f"status {status}"]
+        self.busy += used.ru_utime + used.ru_stime
+        if child.returncode:
+            self.failure = "failed: " + lines[-1].replace("|", "/")[:120]
+
+    @property
+    def seconds(self) -> float:
+        """What has passed since the beginning."""
+        return time.perf_counter() - self.begun
 
 
 def find_python(version: str) -> Path | None:
@@ -67,60 +100,56 @@ def build_wheel(folder: Path) -> Path:
     return wheel
 
 
-def install(python: Path, version: str, mujoco: str, wheel: Path, folder: Path) -> Row:
+def install(version: str, mujoco: str, wheel: Path, python: Path, folder: Path) -> Row:
     """Installs the core into a fresh environment and runs the smoke tests."""
-    begun = time.perf_counter()
-    subprocess.run([str(python), "-m", "venv", str(folder)], check=True)
-    own = folder / "bin" / "python"
-    done = _run([str(own), *PIP, "install", "--only-binary=:all:", f"{wheel}", mujoco])
-    megabytes = sum(f.stat().st_size for f in folder.rglob("*") if f.is_file()) / 1e6
-    if done is None:
-        done = _run([str(own), str(ROOT / "tools" / "smoke.py")], cwd=folder)
-    status = done or ("ok" if megabytes <= MOST_MEGABYTES else f"over {MOST_MEGABYTES} MB")
-    seconds = time.perf_counter() - begun
-    return Row(version, mujoco, "installed, smoke tests", status, seconds, megabytes)
+    runs, own = Runs(), str(folder / "bin" / "python")
+    runs.run([str(python), "-m", "venv", str(folder)])
+    empty = measure(folder)
+    runs.run([own, *PIP, "install", "--only-binary=:all:", str(wheel), mujoco])
+    megabytes = measure(folder) - empty
+    runs.run([own, str(ROOT / "tools" / "smoke.py")], cwd=folder)
+    fits = megabytes <= MOST_MEGABYTES
+    status = runs.failure or ("ok" if fits else f"over {MOST_MEGABYTES} MB")
+    what = "installed, smoke tests"
+    return Row(version, mujoco, what, status, runs.seconds, runs.busy, megabytes)
+
+
+def measure(folder: Path) -> float:
+    """Returns the disk that a folder takes, in 2^20 bytes, as `du -sm` does."""
+    return sum(file.lstat().st_blocks for file in folder.rglob("*")) * 512 / 2**20
 
 
 def resolve(version: str | None, beside: str, wheel: Path) -> Row:
     """Lets pip find versions that go together, and installs nothing."""
-    begun = time.perf_counter()
     words = [sys.executable, *PIP, "install", "--dry-run", "--only-binary=:all:"]
+    runs = Runs()
     with tempfile.TemporaryDirectory() as folder:
         words += ["--target", folder]
         words += ["--python-version", version] if version else []
-        status = _run([*words, str(wheel), beside]) or "resolves"
+        runs.run([*words, str(wheel), beside])
     shown = version or ".".join(map(str, sys.version_info[:2]))
-    return Row(shown, beside, "resolution alone", status, time.perf_counter() - begun)
+    status = runs.failure or "resolves"
+    return Row(shown, beside, "resolution alone", status, runs.seconds, runs.busy)
 
 
-def _run(words: list[str], cwd: Path | None = None) -> str | None:
-    """Runs a program; None if all went well, else the last line that it said."""
-    done = subprocess.run(words, capture_output=True, text=True, cwd=cwd)
-    if done.returncode == 0:
-        return None
-    said = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-    return "failed: " + (said[-1] if said else f"status {done.returncode}").replace("|", "/")[:120]
-
-
-def list_rows(only_resolve: bool) -> Iterator[Row]:
-    """Yields the rows as they come."""
-    with tempfile.TemporaryDirectory() as name:
-        wheel = build_wheel(Path(name) / "wheel")
-        for version in PYTHONS:
-            python = None if only_resolve else find_python(version)
-            for number, mujoco in enumerate(MUJOCOS):
-                if python is None:
-                    yield resolve(version, mujoco, wheel)
-                else:
-                    folder = Path(name) / f"{version}-{number}"
-                    yield install(python, version, mujoco, wheel, folder)
-        for other in NEIGHBOURS:
-            yield resolve(None, other, wheel)
+def list_jobs(only_resolve: bool, folder: Path) -> Iterator[Callable[[], Row]]:
+    """Yields what makes each row."""
+    wheel = build_wheel(folder / "wheel")
+    for version in PYTHONS:
+        python = None if only_resolve else find_python(version)
+        for number, mujoco in enumerate(MUJOCOS):
+            if python is None:
+                yield partial(resolve, version, mujoco, wheel)
+            else:
+                own = folder / f"{version}-{number}"
+                yield partial(install, version, mujoco, wheel, python, own)
+    for other in NEIGHBOURS:
+        yield partial(resolve, None, other, wheel)
 
 
 def write_table(rows: list[Row]) -> None:
     """Puts the table between the marks of the page."""
-    head = ["| Python | beside | what was done | status | s | MB |", "|---|---|---|---|---|---|"]
+    head = ["| Python | beside | what was done | status | s | CPU s | MB |", f"|{'---|' * 7}"]
     table = "\n".join([*head, *(row.format() for row in rows)])
     pattern = re.compile(f"{re.escape(MARKS[0])}.*?{re.escape(MARKS[1])}", re.S)
     text = PAGE.read_text(encoding="utf-8")
@@ -131,12 +160,15 @@ def main() -> int:
     """Fills the table; 1 if something failed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--resolve", action="store_true", help="install nothing")
+    parser.add_argument("--jobs", type=int, default=1, help="so many rows at a time")
     arguments = parser.parse_args()
     rows = []
-    for row in list_rows(arguments.resolve):
-        print(row.format(), flush=True)
-        rows.append(row)
-        write_table(rows)
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(arguments.jobs) as pool:
+        jobs = list(list_jobs(arguments.resolve, Path(folder)))
+        for row in pool.map(lambda job: job(), jobs):
+            print(row.format(), flush=True)
+            rows.append(row)
+            write_table(rows)
     return int(not all(row.status in ("ok", "resolves") for row in rows))
 
 

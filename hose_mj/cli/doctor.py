@@ -167,6 +167,9 @@ def examine_cable_plugin() -> Finding:
     try:
         import mujoco
 
+        if int(mujoco.__version__.partition(".")[0]) >= 4:
+            found = f"none in MuJoCo {mujoco.__version__}"
+            return Finding(name, found, wanted, False, MUJOCO_REMEDY, False)
         model = mujoco.MjModel.from_xml_string(CABLE_SCENE)
     except Exception as error:  # whatever stops it (an import, a parser) is the finding
         return Finding(name, describe(error), wanted, False, MUJOCO_REMEDY, False)
@@ -258,9 +261,11 @@ def print_table(findings: list[Finding]) -> None:
         table.add_row(finding.name, state, Text(finding.value), Text(finding.limit))
     console = Console()
     console.print(table)
+    missed: dict[tuple[str, str], list[str]] = {}
     for finding in findings:
         if not finding.satisfied:
-            state = Text(finding.state, colors[finding.state])
-            console.print(state, Text(f"{finding.name}: {finding.remedy}"))
+            missed.setdefault((finding.state, finding.remedy), []).append(finding.name)
+    for (kind, remedy), names in missed.items():
+        console.print(Text(kind, colors[kind]), Text(f"{', '.join(names)}: {remedy}"))
     if all(finding.ok for finding in findings):
         console.print("All that simulation and learning need is here.")

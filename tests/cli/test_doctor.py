@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,18 @@ def test_a_missing_extra_is_a_warning_with_its_name():
     finding = doctor.examine_dependency(Requirement("no-such-package>=1"), "viewer")
     assert (finding.state, finding.ok) == ("warning", True)
     assert finding.remedy == "pip install 'hose-mj[viewer]'"
+
+
+def test_what_one_extra_brings_is_one_line(capsys):
+    finding = partial(doctor.Finding, value="", limit="", satisfied=False, required=False)
+    doctor.print_table([finding(name=name, remedy="install it") for name in ("one", "two")])
+    assert "warning one, two: install it\n" in capsys.readouterr().out
+
+
+def test_mujoco_4_is_named_where_the_cable_is_gone(monkeypatch):
+    monkeypatch.setattr("mujoco.__version__", "4.0.0")
+    finding = doctor.examine_cable_plugin()
+    assert (finding.value, finding.ok) == ("none in MuJoCo 4.0.0", True)
 
 
 def test_every_extra_is_known_by_its_modules():

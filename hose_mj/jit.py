@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite.binding import Linkage, parse_assembly
+from llvmlite.binding import Linkage, parse_assembly  # type: ignore[import-untyped]
 from numba import types
 from numba.core import event
 from numba.core.caching import IndexDataCacheFile
@@ -178,8 +178,8 @@ class _LinkedLibrary(JITCodeLibrary):
     """Code that others link into theirs, as is: no machine code is made of it."""
 
     def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
+        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
+        self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
         self._shared_module, names = self._final_module, []
         for function in self._shared_module.functions:
             # May be defined in many modules, and dropped where nobody calls it.
@@ -191,7 +191,7 @@ class _LinkedLibrary(JITCodeLibrary):
         # What numba sets in memory for a function it has compiled, and nothing else.
         self._final_module = parse_assembly("".join(map(_DECLARE.format, names)))
         self._final_module.name = self.name
-        super()._finalize_final_module()
+        super()._finalize_final_module()  # type: ignore[no-untyped-call]
 
 
 class _LinkedCompiler(Compiler):
@@ -199,9 +199,10 @@ class _LinkedCompiler(Compiler):
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compiles a function as numba does, but into a `_LinkedLibrary`."""
-        self.state.library = _LinkedLibrary(self.state.targetctx.codegen(), func.__qualname__)
+        make: Any = _LinkedLibrary
+        self.state.library = make(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
-        return super().compile_extra(func)
+        return super().compile_extra(func)  # type: ignore[no-untyped-call]
 
 
 def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str, Any]) -> None:

@@ -6,6 +6,7 @@ Whoever needs one says so before any work is done, with `require`.
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Sequence
 
 from hose_mj.errors import HoseError
 
@@ -26,13 +27,15 @@ class MissingExtra(HoseError, ImportError):  # noqa: N818 - it names what is wro
     """An optional part of the installation that is not there.
 
     Args:
-        extra: which.
+        extra: which; several with commas between (``"report,viewer"``).
         purpose: what it is wanted for, as the subject of a sentence (``"rendering films"``).
     """
 
     def __init__(self, extra: str, purpose: str) -> None:
         self.extra, self.purpose = extra, purpose
-        super().__init__(f"{purpose} needs the extra `{extra}`: pip install 'hose-mj[{extra}]'")
+        kind = "extras" if "," in extra else "extra"
+        names = " and ".join(f"`{name}`" for name in extra.split(","))
+        super().__init__(f"{purpose} needs the {kind} {names}: pip install 'hose-mj[{extra}]'")
 
 
 def find_extra(module: str) -> str | None:
@@ -67,6 +70,16 @@ def require(part: str, purpose: str) -> None:
     missing = find_missing(extra) if part in EXTRAS else [part] * (not _is_found(part))
     if missing:
         raise MissingExtra(extra, purpose)
+
+
+def require_all(extras: Sequence[str], purpose: str) -> None:
+    """Checks several extras as `require` does one; what is missing is said at once.
+
+    Raises:
+        MissingExtra: one or more are not there.
+    """
+    if missing := [extra for extra in extras if not is_installed(extra)]:
+        raise MissingExtra(",".join(missing), purpose)
 
 
 def _is_found(module: str) -> bool:

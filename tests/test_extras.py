@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from hose_mj.errors import HoseError
-from hose_mj.extras import EXTRAS, MissingExtra, find_extra, is_installed, require
+from hose_mj.extras import EXTRAS, MissingExtra, find_extra, is_installed, require, require_all
 
 
 @pytest.mark.parametrize("part", ["viewer", "rerun"])
@@ -21,6 +21,17 @@ def test_a_missing_extra_is_one_line_with_the_remedy(monkeypatch, part):
     assert isinstance(caught.value, HoseError)
     assert isinstance(caught.value, ImportError)
     assert not is_installed("viewer")
+
+
+def test_several_missing_extras_are_said_at_once(monkeypatch):
+    for module in ("rerun", "matplotlib"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingExtra) as caught:
+        require_all(("report", "rl", "viewer"), "a report")
+    assert str(caught.value) == (
+        "a report needs the extras `report` and `viewer`: pip install 'hose-mj[report,viewer]'"
+    )
+    require_all(("rl",), "nothing")
 
 
 def test_what_is_there_passes_without_being_imported(monkeypatch, tmp_path):

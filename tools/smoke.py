@@ -18,6 +18,7 @@ import numpy as np
 from hose_mj import HoseSpec, make_hose
 from hose_mj.errors import HoseError
 from hose_mj.extras import is_installed
+from hose_mj.hoses.registry import find_model
 
 SPEC = HoseSpec.from_material(
     length=1.0,
@@ -41,17 +42,17 @@ def hang(model: str, **options: int | float) -> str:
     return f"tip {np.round(tip, 3)}"
 
 
-def try_cable() -> str:
-    """Runs MuJoCo's cable, which 4 no longer has: there one clear line is what must come."""
-    gone = int(mujoco.__version__.partition(".")[0]) >= 4
+def try_model(model: str, run: Callable[[], str]) -> str:
+    """Runs a model of MuJoCo's; of versions that lack it one clear line must come."""
+    lacking = find_model(model).find_obstacle()
     try:
-        found = hang("cable", timestep=0.001, segments=10)
+        found = run()
     except HoseError as error:
-        if gone and "\n" not in str(error):
+        if lacking and "\n" not in str(error):
             return f"refused, as it must be: {error}"
         raise
-    if gone:
-        raise SystemExit("cable: MuJoCo 4 has none, yet it ran")
+    if lacking:
+        raise SystemExit(f"{model}: it ran, though {lacking}")
     return found
 
 
@@ -95,10 +96,10 @@ def list_parts() -> dict[str, Callable[[], str]]:
     """The parts by name."""
     return {
         "geds": lambda: hang("geds", timestep=0.01, control_points=16),
-        "flex": lambda: hang("flex", timestep=0.002, segments=20),
-        "cable": try_cable,
+        "flex": lambda: try_model("flex", lambda: hang("flex", timestep=0.002, segments=20)),
+        "cable": lambda: try_model("cable", lambda: hang("cable", timestep=0.001, segments=10)),
         "rollout, geds": lambda: roll_out("geds"),
-        "rollout, flex": lambda: roll_out("flex"),
+        "rollout, flex": lambda: try_model("flex", lambda: roll_out("flex")),
         "environment": play,
     }
 

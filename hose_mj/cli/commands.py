@@ -48,7 +48,6 @@ GROUPS: dict[str, dict[str, Command]] = {
             "hose_mj.cli.compare",
             "measure the hose models against closed forms, or on your own hose",
             ("hose-mj compare --quick", "hose-mj compare garden_hose --models geds cable"),
-            needs=("report", "viewer"),
         ),
         "check-breaks": Command(
             "hose_mj.cli.check_breaks",

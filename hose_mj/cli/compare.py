@@ -15,7 +15,7 @@ import tyro
 
 from hose_mj.cli.results import check_counts, make_folder, print_checks, print_table
 from hose_mj.errors import InputError
-from hose_mj.extras import is_installed, require
+from hose_mj.extras import is_installed, require_all
 from hose_mj.recording.document import make_document, print_document
 
 if TYPE_CHECKING:
@@ -105,8 +105,7 @@ def check_report(args: Args) -> bool:
     """
     if args.json and args.out == OUT and not (is_installed("report") and is_installed("viewer")):
         return False
-    require("report", "the report of a comparison")
-    require("viewer", "the recording of a comparison")
+    require_all(("report", "viewer"), "the report of a comparison")
     return True
 
 

@@ -17,7 +17,7 @@ from typing import Any, Protocol, TextIO, cast
 import hose_mj
 from hose_mj.cli.commands import COMMANDS, GROUPS, Command
 from hose_mj.errors import HoseError, InputError
-from hose_mj.extras import MissingExtra, find_extra, require
+from hose_mj.extras import MissingExtra, find_extra, require_all
 
 DONE, CHECK_FAILED, BAD_INPUT, REFUSED, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 """Exit statuses; the last two are what a shell expects after Ctrl-C and of a closed pipe."""
@@ -170,8 +170,7 @@ def run_command(words: Sequence[str]) -> int:
     rest = [word for word in rest if word != "--quiet"]
     module = cast(CommandModule, importlib.import_module(command.module))
     args = parse_arguments(name, module.Args, rest)
-    for extra in command.needs:
-        require(extra, f"hose-mj {name}")
+    require_all(command.needs, f"hose-mj {name}")
     with ExitStack() as stack:
         if quiet:
             stack.enter_context(redirect_stderr(stack.enter_context(_open_nothing())))

@@ -40,8 +40,9 @@ class ModelEntry:
         contact: the class takes obstacles.
         contact_law: the class takes a contact law as well.
         requires: package that must be installed, "" for none.
-        below: major version from which on that package no longer will do; None for any.
-        missing: what a package that is too new lacks, in words.
+        since: version from which on that package will do, (major, minor); None for any.
+        below: major version from which on it no longer will do; None for any.
+        missing: what a package that is too old or too new lacks, in words.
     """
 
     target: str
@@ -58,6 +59,7 @@ class ModelEntry:
     contact: bool = False
     contact_law: bool = False
     requires: str = ""
+    since: tuple[int, int] | None = None
     below: int | None = None
     missing: str = ""
 
@@ -69,10 +71,15 @@ class ModelEntry:
             installed = version(self.requires)
         except PackageNotFoundError:
             return f"it needs {self.requires}: pip install {self.requires}"
-        if self.below is not None and int(installed.partition(".")[0]) >= self.below:
-            needed = f"it needs {self.requires} below {self.below}"
-            return f"{self.requires} {installed} {self.missing}; {needed}"
-        return None
+        parts = tuple(int(part) for part in installed.split(".")[:2])
+        if self.since is not None and parts < self.since:
+            needed = "{}.{} or later".format(*self.since)
+        elif self.below is not None and parts[0] >= self.below:
+            needed = f"below {self.below}"
+        else:
+            return None
+        told = f"{self.requires} {installed} {self.missing}"
+        return f"{told}; it needs {self.requires} {needed}"
 
     def load(self) -> type[Any]:
         """Imports the class.
@@ -119,6 +126,8 @@ MODELS: dict[str, ModelEntry] = {
         description="MuJoCo's 1-D flex: point masses, rigid edges, implicit bending, no twist",
         scheme=None,
         schemes=("discrete",),
+        since=(3, 13),
+        missing='has no integrator "discrete"',
         statics="newton on vertices",
         twists=False,
         **_MUJOCO,

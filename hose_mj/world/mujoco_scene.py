@@ -17,7 +17,7 @@ import numpy as np
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.mujoco.chain_settings import IMPEDANCE_RATIO
+from hose_mj.hoses.mujoco.chain_settings import IMPEDANCE_RATIO, find_integrator
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
@@ -57,13 +57,14 @@ class Numerics:
         """Writes the options of a scene that is being made.
 
         Raises:
-            InputError: a scene that switches off what ties the hose to its robots.
+            InputError: a scene that switches off what ties the hose to its robots; an integrator
+                that this MuJoCo lacks.
         """
         for flag in ("CONSTRAINT", "EQUALITY"):
             if option.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"):
                 raise InputError(f"<option> <flag> {flag.lower()}", "disable", "enable")
         option.timestep = self.inner_step
-        option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{self.integrator.upper()}")
+        option.integrator = find_integrator(self.integrator)
         option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{self.jacobian.upper()}")
         option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPEDANCE_RATIO

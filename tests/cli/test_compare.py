@@ -227,7 +227,7 @@ def test_without_the_extras_of_the_report_json_alone_runs(capsys, tmp_path, monk
     words = ("--cases", "tip-load-1", "--models", "geds")
     status, printed, said = run(capsys, *words)
     assert (status, printed) == (2, "")
-    assert "pip install 'hose-mj[report]'" in said
+    assert "pip install 'hose-mj[report,viewer]'" in said
     assert said.count("\n") == 1
     status, printed, said = run(capsys, *words, "--json")
     assert status == 0

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import inspect
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from hose_mj.errors import InputError
 from hose_mj.hoses import registry
+from hose_mj.hoses.mujoco.chain_settings import find_integrator
 from hose_mj.hoses.registry import MODELS, find_model, list_models, make_hose
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.world.registry import make_world
@@ -91,6 +93,25 @@ def test_under_mujoco_4_the_cable_says_what_is_left(monkeypatch):
         make_hose("cable", SPEC, timestep=1e-3)
     with pytest.raises(InputError, match=message):
         make_world("no scene is read", "cable")
+
+
+@pytest.mark.parametrize("old", ["3.11.0", "3.12.1"])
+def test_before_mujoco_3_13_the_flex_says_what_it_lacks(monkeypatch, old):
+    monkeypatch.setattr(registry, "version", lambda package: old)
+    with pytest.raises(InputError) as caught:
+        registry.check_model("flex")
+    assert str(caught.value) == (
+        "model is 'flex'; valid: one of geds, cable, hinge-chain "
+        f'(mujoco {old} has no integrator "discrete"; it needs mujoco 3.13 or later)'
+    )
+
+
+def test_an_integrator_that_this_mujoco_lacks(monkeypatch):
+    mujoco = pytest.importorskip("mujoco")
+    older = SimpleNamespace(mjINT_EULER=0, mjINT_RK4=1)
+    monkeypatch.setattr(mujoco, "mjtIntegrator", older)
+    with pytest.raises(InputError, match=r"integrator is 'discrete'; valid: one of euler, rk4 \("):
+        find_integrator("discrete")
 
 
 def test_without_mujoco_geds_is_left(monkeypatch):

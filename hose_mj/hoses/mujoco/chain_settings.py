@@ -51,7 +51,7 @@ class ChainSettings:
         """Writes the options of a model that is being made."""
         option.timestep, option.gravity = self.timestep, np.asarray(self.gravity, dtype=float)
         option.iterations, option.tolerance = self.iterations, self.tolerance
-        option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{self.integrator.upper()}")
+        option.integrator = find_integrator(self.integrator)
         option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{self.jacobian.upper()}")
 
     def hold_options(self) -> dict[str, object]:
@@ -76,6 +76,16 @@ class ChainSettings:
         if self.hold_solref is None:
             return 2 * self.timestep, 1.0
         return float(self.hold_solref[0]), float(self.hold_solref[1])
+
+
+def find_integrator(name: str) -> mujoco.mjtIntegrator:
+    """Returns one of `INTEGRATORS` by its name; raises `InputError` where this MuJoCo lacks it."""
+    found = getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None)
+    if found is None:
+        here = [i for i in INTEGRATORS if hasattr(mujoco.mjtIntegrator, f"mjINT_{i.upper()}")]
+        known = f"one of {', '.join(here)} (MuJoCo {mujoco.__version__}; discrete: 3.13 or later)"
+        raise InputError("integrator", name, known)
+    return found
 
 
 def check_solref(name: str, value: Sequence[float] | None) -> None:

@@ -83,7 +83,7 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES})
 
 
-sys.meta_path.append(MovedFinder())
+sys.meta_path.insert(0, MovedFinder())
 
 
 if "gymnasium" in sys.modules:

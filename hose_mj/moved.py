@@ -10,7 +10,8 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
 from types import ModuleType
 
 MOVED = {
@@ -38,28 +39,62 @@ MOVED = {
 
 
 class MovedFinder(MetaPathFinder):
-    """Finds a module by its old name where nothing else is found under it."""
+    """Finds a module by its old name, unless the user has one of that name.
+
+    It comes before Python's own finders: these would look into the folder of the package that took
+    an old one's place, and load what they find there a second time, under the old name.
+    """
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Returns a spec for an old name; None for others, and inside a user's own `learning`."""
-        if fullname not in MOVED:
+        """Returns a spec for an old name; None for others, and for what the user has."""
+        new = _find_new_name(fullname)
+        if new is None or _is_users(fullname):
             return None
-        top = sys.modules.get("learning")
-        if fullname.startswith("learning.") and top and top.__name__ == "learning" and top.__file__:
-            return None
-        return ModuleSpec(fullname, _MovedLoader())
+        return ModuleSpec(fullname, _MovedLoader(new))
+
+
+def _find_new_name(name: str) -> str | None:
+    """Returns what a module is called now; None for one that is not ours or still called so."""
+    if name in MOVED:
+        top = sys.modules.get("learning") if name.startswith("learning.") else None
+        own = top is not None and top.__name__ == "learning" and top.__file__
+        return None if own else MOVED[name]
+    parent, _, last = name.rpartition(".")
+    if parent not in MOVED or parent not in sys.modules:
+        return None
+    now = sys.modules[parent].__name__
+    return None if now == parent else f"{now}.{last}"
+
+
+def _is_users(name: str) -> bool:
+    """Says whether a module is the user's: not in a package of ours that has another name now.
+
+    Nor in a folder without code, such as the caches that an update of a checkout leaves behind.
+    """
+    parent = name.rpartition(".")[0]
+    module = sys.modules.get(parent)
+    if parent and (module is None or module.__name__ != parent or parent.startswith("hose_mj")):
+        return False
+    spec = PathFinder.find_spec(name, getattr(module, "__path__", None))
+    if spec is None or spec.origin is not None:
+        return spec is not None
+    places = map(Path, spec.submodule_search_locations or ())
+    return any(True for place in places for _ in place.rglob("*.py"))
 
 
 class _MovedLoader(Loader):
     """Loads the module that took another's place."""
 
+    def __init__(self, new: str) -> None:
+        self._new = new
+
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        new = MOVED[spec.name]
         if "." in spec.name:  # once for an import, not for each package on the way
-            warnings.warn(f"{spec.name} is {new} now", DeprecationWarning, stacklevel=2)
-        module = importlib.import_module(new)
+            text = f"{spec.name} is {self._new} now"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+        module = importlib.import_module(self._new)
         self._own = module.__spec__
         return module
 

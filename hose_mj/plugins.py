@@ -11,6 +11,7 @@ Groups: `hose_mj.hoses`, `hose_mj.tasks`, `hose_mj.scenes`, `hose_mj.cases`,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -26,10 +27,14 @@ def find_plugins(group: str, own: Collection[str] = ()) -> dict[str, EntryPoint]
         own: the registry's own names, which no package may take.
 
     Raises:
-        InputError: a name that is the registry's own, or that two packages take.
+        InputError: a name that is the registry's own, that two packages take, or that would be no
+            word in a shell or in the id of an environment.
     """
     found: dict[str, EntryPoint] = {}
+    spelling = "with a name of letters, digits, dots and dashes, a letter or digit first"
     for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
+        if not re.fullmatch(r"[A-Za-z0-9][\w.-]*", entry.name, re.ASCII):
+            raise InputError(_describe(entry), entry.value, spelling)
         if entry.name in own:
             taken = f"a name other than hose_mj's own: {', '.join(own)}"
             raise InputError(_describe(entry), entry.value, taken)
@@ -53,8 +58,9 @@ def load_plugin(entry: EntryPoint, kind: type | tuple[type, ...] = object) -> An
     """
     try:
         loaded = entry.load()
-    except Exception as error:
-        valid = f"importable ({type(error).__name__}: {error})"
+    except (Exception, SystemExit) as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        valid = f"importable ({reason})"
         raise InputError(_describe(entry), entry.value, valid) from error
     if not isinstance(loaded, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
@@ -12,12 +13,12 @@ from hose_mj.plugins import find_plugins, load_plugin
 GROUP = "hose_mj.tests"
 
 
-def install(folder, package, text, **modules):
+def install(folder, package, text, group=GROUP, **modules):
     """Puts an installed package, as importlib.metadata sees it, into a folder on the path."""
     information = folder / f"{package}-1.0.dist-info"
     information.mkdir(parents=True)
     (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text(f"[{GROUP}]\n{text}\n")
+    (information / "entry_points.txt").write_text(f"[{group}]\n{text}\n", "utf-8")
     for name, source in modules.items():
         (folder / f"{name}.py").write_text(source)
 
@@ -70,6 +71,8 @@ def test_two_packages_cannot_take_one_name(folder):
     [
         ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
         ("1 / 0", "ZeroDivisionError"),
+        ("raise SystemExit(5)", "SystemExit: 5"),
+        ("raise ValueError('two\\nlines')", "ValueError: two lines"),
         ("", "has no attribute 'BEE'"),
     ],
 )
@@ -84,3 +87,27 @@ def test_a_plugin_of_another_kind_is_refused(folder):
     install(folder, "swarm", "bee = swarm_four:BEE", swarm_four="BEE = 3")
     with pytest.raises(InputError, match="package swarm is 3; valid: a str or a type"):
         load_plugin(find_plugins(GROUP)["bee"], (str, type))
+
+
+@pytest.mark.parametrize("name", ["two words", "a/b", "$(x)", "-x", "é"])
+def test_a_name_that_is_no_word_is_refused(folder, name):
+    install(folder, "swarm", f"{name} = swarm:BEE")
+    with pytest.raises(InputError, match=r"of package swarm .* letters, digits"):
+        find_plugins(GROUP)
+
+
+def test_a_broken_task_of_others_leaves_runs_of_ours_alone(folder):
+    from hose_learning.learners.catalog import make_settings
+    from hose_learning.study.run_folder import describe
+    from hose_learning.study.training import Training
+
+    from hose_mj.tasks.registry import list_tasks, make_task
+
+    install(folder, "swarm", "bee = no_such_module:BEE", group="hose_mj.tasks")
+    with pytest.raises(InputError, match="package swarm"):
+        list_tasks()
+    task = make_task("maze")
+    training = Training(
+        task, "q-learning", make_settings("q-learning", task), np.random.default_rng(0)
+    )
+    assert describe(training, 0)["task"] == "maze"

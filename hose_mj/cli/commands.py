@@ -13,12 +13,13 @@ class Renamed:
     Attributes:
         new: how it is called now; None if it had no effect and is gone.
         prefix: goes before each of its values.
-        several: True if only the option with several values has another name now.
+        several: words that the option took; if there are some, it is only with several of these
+            that it has another name now.
     """
 
     new: str | None
     prefix: str = ""
-    several: bool = False
+    several: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ GROUPS: dict[str, dict[str, Command]] = {
                 "hose-mj rollout deck --policy break-obstacle --save deck.rrd",
                 "hose-mj rollout floor_2 --models geds flex --save both.rrd",
             ),
-            renamed={"--model": Renamed("--models", several=True)},
+            renamed={"--model": Renamed("--models", several=("geds", "cable", "flex"))},
         ),
         "drive": Command(
             "hose_mj.cli.drive",
@@ -87,7 +88,6 @@ GROUPS: dict[str, dict[str, Command]] = {
                 "hose-mj train taxi --learner d-rr-ql --seed 3",
                 "hose-mj train line --set n_robots=3 --episodes 5000",
             ),
-            needs=("report",),
         ),
         "curves": Command(
             "hose_mj.cli.learning_curves",

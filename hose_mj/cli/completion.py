@@ -40,6 +40,7 @@ _hose_mj() {{
   for (( k = 2; k < COMP_CWORD; k++ )); do
     [[ ${{COMP_WORDS[k]}} == --* ]] && option=${{COMP_WORDS[k]}}
   done
+  case $option in {flags}) option="" ;; esac
   case "${{COMP_WORDS[1]}} $option" in
 {values}
   esac
@@ -104,13 +105,29 @@ def collect_words() -> dict[str, dict[str, list[str]]]:
         for field in dataclasses.fields(arguments):
             known = names.get(NAMED.get(field.name, ""), [])
             if "Positional" in str(field.type):
-                words[""] += known
+                words[""] += [name for name in known if name not in words[""]]
             else:
                 words[f"--{field.name.replace('_', '-')}"] = known
         found[command] = words | {"--quiet": [], "--help": []}
     found["list"][""] = list(KINDS)
     found["completion"][""] = ["bash", "zsh", "fish"]
+    for command in ("warm", "bench"):
+        if len(found[command]) > 2:
+            found[command][""] = list(importlib.import_module(COMMANDS[command].module).GROUPS)
     return found
+
+
+def list_flags() -> list[str]:
+    """Returns the options that take no value, in whichever command."""
+    flags = {"--quiet", "--help"}
+    for entry in COMMANDS.values():
+        try:
+            arguments = importlib.import_module(entry.module).Args
+        except ImportError:  # an extra that is not here
+            continue
+        own = (field.name for field in dataclasses.fields(arguments) if field.type == "bool")
+        flags |= {f"--{name.replace('_', '-')}" for name in own}
+    return sorted(flags)
 
 
 def make_bash(words: dict[str, dict[str, list[str]]]) -> str:
@@ -125,7 +142,12 @@ def make_bash(words: dict[str, dict[str, list[str]]]) -> str:
         f'      {command}) words+=" {" ".join(option for option in options if option)}" ;;'
         for command, options in words.items()
     ]
-    return BASH.format(commands=" ".join(words), values="\n".join(values), options="\n".join(lines))
+    return BASH.format(
+        commands=" ".join(words),
+        flags=" | ".join(list_flags()),
+        values="\n".join(values),
+        options="\n".join(lines),
+    )
 
 
 def make_fish(words: dict[str, dict[str, list[str]]]) -> str:

@@ -165,9 +165,10 @@ def run_command(words: Sequence[str]) -> int:
         known = "--help, --version" if what == "option" else ", ".join(COMMANDS)
         raise InputError(what, name, known)
     command = COMMANDS[name]
-    rest = rename_options(name, command, words[1:])
-    quiet = "--quiet" in rest
-    rest = [word for word in rest if word != "--quiet"]
+    quiet = "--quiet" in words
+    rest = [word for word in words[1:] if word != "--quiet"]
+    with redirect_stderr(io.StringIO()) if quiet else nullcontext():
+        rest = rename_options(name, command, rest)
     module = cast(CommandModule, importlib.import_module(command.module))
     args = parse_arguments(name, module.Args, rest)
     require_all(command.needs, f"hose-mj {name}")
@@ -192,7 +193,7 @@ def rename_options(name: str, command: Command, words: Sequence[str]) -> list[st
     kept: list[list[str]] = []
     for part in parts:
         rule = command.renamed.get(part[0]) if part else None
-        if rule is None or (rule.several and len(part) < 3):
+        if rule is None or (rule.several and not _are_several(part[1:], rule.several)):
             kept.append(part)
             continue
         said = "has no effect" if rule.new is None else f"is now {rule.new}"
@@ -207,6 +208,11 @@ def rename_options(name: str, command: Command, words: Sequence[str]) -> list[st
         else:
             same += values
     return [word for part in kept for word in part]
+
+
+def _are_several(values: Sequence[str], known: Sequence[str]) -> bool:
+    """Says whether these are all values: a last one that is not known is the next argument."""
+    return len(values) > 1 and set(values) <= set(known)
 
 
 def parse_arguments(name: str, arguments: type[Any], words: Sequence[str]) -> Any:
@@ -228,8 +234,9 @@ def parse_arguments(name: str, arguments: type[Any], words: Sequence[str]) -> An
 
 def _finish_help(name: str, text: str) -> str:
     """The help of a sub-command, wrapped, with examples, without defaults that say nothing."""
-    empty = re.compile(r"\(default: (None|False|)\)")
-    lines = [empty.sub(lambda found: " " * len(found.group()), line) for line in text.splitlines()]
+    empty = re.compile(r"\(default:[\s│|]*(None|False)?[\s│|]*\)")  # wrapped or not
+    text = empty.sub(lambda found: re.sub(r"[^\s│|]", " ", found.group()), text)
+    lines = [line for line in text.splitlines() if not re.fullmatch(r"[│|]\s+[│|]", line)]
     lines = [line if line[:1] in "│╭╰|+" else _wrap(line) for line in lines]
     examples = COMMANDS[name].examples if name in COMMANDS else ()
     lines += ["", "examples:", *(f"  {line}" for line in examples), ""] if examples else []

@@ -20,9 +20,10 @@ from hose_learning.study.training import Episodes, Training, join
 from hose_mj.cli.progress import defer_interrupt, show_progress
 from hose_mj.cli.results import check_choice, check_counts, print_table
 from hose_mj.cli.task_options import parse_options
+from hose_mj.extras import require
 from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
-from hose_mj.tasks.registry import TASKS, make_task
+from hose_mj.tasks.registry import list_tasks, make_task
 from hose_mj.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -91,13 +92,14 @@ class Args(LearnerArgs):
 def run(args: Args) -> int:
     """Trains; 0 when done."""
     if args.list:
-        _list()
+        _list(args)
         return 0
     check_counts(args, episodes=1, moves=1, tests=1, seed=0)
     if args.values is not None:
         check_choice("values", args.values, VALUES)
     if args.vetoes is not None:
         check_choice("vetoes", args.vetoes, VETOES)
+    require("report", "hose-mj train")
     folder, training, seed, args = _resume(args) if args.resume else _begin(args)
     before = training.moves
     begun = time.perf_counter()
@@ -244,10 +246,17 @@ def _summarize(
     }
 
 
-def _list() -> None:
+def _list(args: Args) -> None:
     style: dict[str, Any] = {"box": None, "title_justify": "left", "show_header": False}
-    tasks = [(id, "", entry.description) for id, entry in TASKS.items()]
+    tasks = [(id, "", entry.description) for id, entry in list_tasks().items()]
     learners = [(id, e.section, e.description) for id, e in catalog.list_learners().items()]
+    if args.json:
+        results = {
+            "tasks": [{"name": id, "description": text} for id, _, text in tasks],
+            "learners": [{"name": id, "description": text} for id, _, text in learners],
+        }
+        print_document(make_document("train", args, seed=args.seed, results=results))
+        return
     print_table("Tasks", ("", "", ""), tasks, **style)
     print_table("Learners", ("", "", ""), learners, **style)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -108,6 +109,9 @@ class HoseSpec:
             )
         if self.rest_strain <= -1.0:
             raise InputError("rest_strain", self.rest_strain, "a number above -1")
+        parts = self.fittings
+        if not isinstance(parts, tuple) or not all(isinstance(one, Fitting) for one in parts):
+            raise InputError("fittings", parts, "a tuple of Fitting")
         end = 0.0
         for fitting in sorted(self.fittings, key=lambda fitting: fitting.start):
             if fitting.start < end or fitting.end > self.length:
@@ -285,7 +289,9 @@ def check_number(
     """Raises `InputError` unless `value` is a finite number of the wanted sign."""
     sign = "" if may_be_negative else (" at or above 0" if may_be_zero else " above 0")
     valid = f"a finite number{sign}"
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(name, value, valid)
+    if not abs(value) <= sys.float_info.max:  # nor is a whole number that no float holds
         raise InputError(name, value, valid)
     if (value < 0 and not may_be_negative) or (value == 0 and not (may_be_zero or may_be_negative)):
         raise InputError(name, value, valid)

@@ -25,6 +25,7 @@ def test_all_commands_and_options_are_there(words, capsys):
     assert {"--learner", "--set", "--quiet", "--json", "--help"} <= set(words["train"])
     assert "d-rr-ql" in words["train"]["--learner"]
     assert "floor_4" in words["rollout"][""]
+    assert all(len(set(names)) == len(names) for of in words.values() for names in of.values())
     assert main(["completion", "bash", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["commands"] == words
 
@@ -39,6 +40,8 @@ def test_all_commands_and_options_are_there(words, capsys):
         (["rollout", "corr"], {"corridor"}),
         (["list", "sc"], {"scenes"}),
         (["completion", "z"], {"zsh"}),
+        (["rollout", "--json", "corr"], {"corridor"}),
+        (["warm", "w"], {"world"}),
     ],
 )
 def test_bash_completes(typed, offered, words):

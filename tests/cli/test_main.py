@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import shlex
 import subprocess
 import sys
@@ -139,6 +140,7 @@ def test_every_command_takes_json_and_its_help_reads_well(name, capsys, monkeypa
     assert cli.main([name, "--help"]) == 0
     out = capsys.readouterr().out
     assert "{None}" not in out
+    assert not re.search(r"None\)|\(default:[\s│]*\)", out)
     assert "without effect" not in out
     assert max(map(len, out.partition("examples:")[0].splitlines())) <= 80
     for line in cli.COMMANDS[name].examples:
@@ -235,8 +237,11 @@ def test_old_spellings_of_options_work_on(capsys):
     old = ["floor_1", "--model", "geds", "cable"]
     found = rename("rollout", cli.COMMANDS["rollout"], old)
     assert found == ["floor_1", "--models", "geds", "cable"]
-    same = ["floor_1", "--model", "geds"]
-    assert rename("rollout", cli.COMMANDS["rollout"], same) == same
+    for same in (["floor_1", "--model", "geds"], ["--model", "geds", "floor_1"]):
+        assert rename("rollout", cli.COMMANDS["rollout"], same) == same
+    capsys.readouterr()
+    assert cli.main(["doctor", "--seed", "3", "--quiet", "surplus"]) == 2
+    assert "no effect" not in capsys.readouterr().err
 
 
 LIST = f"'{sys.executable}' -m hose_mj list models"

@@ -167,6 +167,9 @@ def test_the_list_names_every_task_and_learner(call):
         assert entry.section.split(",")[0] in out
     for task in ("line-2015", "taxi-single-agent", "corridor"):
         assert task in out
+    status, out, _ = call("train", "--list", "--json")
+    assert status == 0
+    assert {one["name"] for one in out["learners"]} == set(LEARNERS)
 
 
 def test_options_reach_task_and_learner(call, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import shutil
 from dataclasses import replace
@@ -10,8 +11,8 @@ import pytest
 
 from hose_mj.assets import find_assets
 from hose_mj.errors import InputError
-from hose_mj.hoses.spec import HoseSpec
-from hose_mj.scenes.hose_file.hose_file import read_own_hose
+from hose_mj.hoses.spec import Fitting, HoseSpec
+from hose_mj.scenes.hose_file.hose_file import read_hose_file
 from hose_mj.scenes.mjcf.scene import read_scene
 
 PLAIN = {"length": 2.0, "axial_stiffness": 5e3, "bending_stiffness": 5e-3, "linear_density": 0.15}
@@ -29,7 +30,7 @@ tangent = [1.0, 0.0, 0.0]
 def read_toml_spec(folder, hose):
     file = folder / "hose.toml"
     file.write_text(TOML.format(hose=hose))
-    return read_own_hose(file).spec
+    return read_hose_file(file).spec
 
 
 def read_mjcf_spec(folder, old="", new=""):
@@ -115,3 +116,15 @@ def test_an_unknown_ready_hose_is_refused():
         HoseSpec.ready("garden", length=1.0)
     with pytest.raises(InputError, match="length is 0; valid: a finite number above 0"):
         HoseSpec.ready("usb-cable", length=0)
+
+
+def test_what_no_float_holds_is_no_number():
+    for length in (10**400, -(10**400), math.inf, math.nan):
+        with pytest.raises(InputError, match="length is"):
+            HoseSpec.ready("garden-hose-19mm", length=length)
+
+
+@pytest.mark.parametrize("fittings", [3, (3,), [Fitting(start=0.0, end=0.1)]])
+def test_fittings_are_a_tuple_of_fittings(fittings):
+    with pytest.raises(InputError, match="valid: a tuple of Fitting"):
+        replace(HoseSpec.ready("garden-hose-19mm", length=1.0), fittings=fittings)

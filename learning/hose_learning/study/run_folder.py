@@ -29,7 +29,7 @@ from hose_learning.tables import is_sound
 from hose_mj.errors import InputError
 from hose_mj.extras import require
 from hose_mj.recording.files import write_atomically
-from hose_mj.tasks.registry import list_tasks, make_task
+from hose_mj.tasks.registry import find_task, make_task
 from hose_mj.version import __version__
 
 MANIFEST = "manifest.json"
@@ -44,8 +44,10 @@ def describe(training: Training, seed: int) -> dict[str, Any]:
     """Returns all settings of a training as plain JSON values."""
     task = training.task
     options = dataclasses.asdict(task.settings)
-    entry = list_tasks().get(task.id)
-    presets = entry.presets if entry else {}
+    try:
+        presets = find_task(task.id).presets
+    except InputError:  # a task that no registry has
+        presets = {}
     return {
         "task": task.id,
         "task_options": {k: v for k, v in options.items() if k not in presets},

@@ -58,6 +58,9 @@ def _keep_known(**options: bool) -> dict[str, bool]:
 _BARE = _keep_known(_nrt=False)
 # To be called from C: nobody does that here.
 _NO_C = _keep_known(no_cfunc_wrapper=True)
+# The versions of numba under which code is linked as is (`_LinkedLibrary`), which overrides what is
+# not public there; under others it is compiled twice, in twice the time.
+_LINKS = numba.version_info[:2] in {(0, 68)}
 # To be called from Python: unpacking a hose's hundred arrays is more code than most kernels.
 _NO_PYTHON = _keep_known(no_cpython_wrapper=True)
 _OPTIONS |= _NO_C
@@ -70,12 +73,16 @@ def _read_fingerprint(package: Path) -> str:
 
     Records and constants are often defined in files without kernels.
     """
-    files = package.rglob("*.py") if package.is_dir() else [package]
+    # The command line compiles nothing, it only gives notice.
+    inside = (f for f in package.rglob("*.py") if "cli" not in f.relative_to(package).parts)
+    files = list(inside) or [package]
     sources = {file: file.read_bytes() for file in files}
     chosen = {file for file, text in sources.items() if b"hose_mj.jit import" in text}
-    imported = (re.findall(rb"^from ([\w.]+) import", sources[file], re.M) for file in chosen)
-    for module in {module.decode() for modules in imported for module in modules}:
-        chosen.add(package.parent.joinpath(*module.split(".")).with_suffix(".py"))
+    lines = (re.findall(rb"^from ([\w.]+) import (.*)", sources[file], re.M) for file in chosen)
+    for module, names in {(m.decode(), n.decode()) for found in lines for m, n in found}:
+        place = package.parent.joinpath(*module.split("."))
+        chosen |= {place / f"{name}.py" for name in re.findall(r"\w+", names)}
+        chosen.add(place.with_suffix(".py"))
     texts = [sources[file] for file in sorted(chosen & sources.keys())]
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]
 
@@ -158,7 +165,7 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         made = numba.njit(**{**_OPTIONS, **options})(function)
         _name_cache(made, "")
         _MADE.add(made)
-        if _NO_PYTHON and hasattr(made, "get_call_template"):
+        if _LINKS and _NO_PYTHON and hasattr(made, "get_call_template"):
             _serve_callers(made, function, options)
         return made
 

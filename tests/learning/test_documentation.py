@@ -57,12 +57,6 @@ def test_a_page_shows_a_curve_and_the_command_that_draws_it(id):
     command = next(line for line in text.splitlines() if line.startswith("hose-mj curves"))
     args = parse_arguments("curves", Args, shlex.split(command)[2:])
     check_arguments(args)
-    assert args.out == Path("docs/learners") / picture
+    assert args.save == Path("docs/learners") / picture
     assert id in args.learners
     assert f"--learner {id}" in text
-
-
-@pytest.mark.parametrize("page", sorted(path.name for path in PAGES.glob("*.md")))
-def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\(([^)#\s]+)\)", read(page)):
-        assert target.startswith("https://") or (PAGES / target).exists(), target

@@ -187,8 +187,7 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
         stage: (h, X, V).
         constraints: rows and what they demand before and after the step.
         fraction: where in the step that demand is taken, 0 to 1.
-        loads: dead loads.
-        scale: what they are multiplied by.
+        loads, scale: dead loads, and what they are multiplied by.
         limits: when to stop.
         x: flat control points (n d,); the guess on entry.
         work: work arrays; multipliers on return.

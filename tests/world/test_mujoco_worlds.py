@@ -170,7 +170,7 @@ def test_a_restored_world_goes_on_bit_by_bit(model):
 
     def read():
         told = [world.attachment_forces(), world.site_positions()]
-        told += [ask(s) for ask in (world.tension, world.position, world.velocity)]
+        told += [ask(s) for ask in (world.tension, world.hose_position, world.hose_velocity)]
         return [world.data.qpos.copy(), world.data.qvel.copy(), *told]
 
     world.step(15)

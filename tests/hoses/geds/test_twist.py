@@ -349,7 +349,9 @@ def test_both_forms_move_alike():
     # Theta has a little inertia of its own, the scalar form has none.
     shapes, torques = [], []
     for form in ("scalar", "theta"):
-        hose = make_hose(form, gravity=(0, 0, -GRAVITY), control_points=16, drag=0.3, radius=0.002)
+        hose = make_hose(
+            form, gravity=(0, 0, -GRAVITY), control_points=16, drag=0.3, outer_radius=0.002
+        )
         hose.reset([[0, 0, 0], [1, 0, 0]])
         hose.clamp(0.0)
         last = hose.clamp(1.0)

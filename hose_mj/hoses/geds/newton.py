@@ -187,17 +187,17 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
         stage: (h, X, V).
         constraints: rows and what they demand before and after the step.
         fraction: where in the step that demand is taken, 0 to 1.
-        loads, scale: dead loads, and what they are multiplied by.
+        loads: dead loads.
+        scale: what they are multiplied by.
         limits: when to stop.
         x: flat control points (n d,); the guess on entry.
         work: work arrays; multipliers on return.
     """
     twist = constraints.twist
-    fallbacks = shortened = 0
+    fallbacks, shortened, iteration = 0, 0, 1
     # True, but no constant: for one numba would compile all that takes it twice.
     exact = fallbacks == 0
     factor = slope = 0.0
-    iteration = 1
     softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
     while True:
         n_contacts = build(axes, hose, stage, twist, fraction, loads, scale, exact, x, work)

@@ -8,6 +8,7 @@ import pytest
 
 from hose_mj.cli import check_breaks
 from hose_mj.cli import main as cli
+from hose_mj.hoses.registry import MODELS
 from hose_mj.rollout.break_sequences import Ending, draw_sequences
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.registry import WORLDS
@@ -24,8 +25,9 @@ class Brittle(GedsWorld):
 
 @pytest.fixture
 def models(monkeypatch):
-    monkeypatch.setitem(WORLDS, "twin", GedsWorld)
-    monkeypatch.setitem(WORLDS, "brittle", Brittle)
+    for name, place in (("twin", WORLDS["geds"]), ("brittle", f"{__name__}:Brittle")):
+        monkeypatch.setitem(MODELS, name, MODELS["geds"])
+        monkeypatch.setitem(WORLDS, name, place)
 
 
 def ask(capsys, *words):

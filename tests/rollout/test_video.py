@@ -29,7 +29,7 @@ def test_frames_show_robots_and_hose_move(frames):
 
 def test_bodies_stand_where_the_samples_have_them(episode, floor):
     model = floor.make_spec().compile()
-    puppets = video.Puppets(model, episode)
+    puppets = video.PosedBodies(model, episode)
     start = puppets.data.geom_xpos.copy()
     puppets.pose(20)  # at 2 s, robot i has moved by -0.2 (i + 1) m
     shift = puppets.data.geom_xpos - start

@@ -51,7 +51,7 @@ test-slow: $(DEV)
 # Under MuJoCo 4 dm-control does not load and the composite cable is gone: what is left has to run.
 smoke-mujoco4: $(NEXT)
 	$(NEXT_BIN)/python -m pytest -m 'not slow' tests/hoses/mujoco/test_mujoco4.py
-	PYTHONPATH=.:learning $(NEXT_BIN)/python tools/smoke.py
+	PYTHONPATH=$(CURDIR):$(CURDIR)/learning $(NEXT_BIN)/python tools/smoke.py
 
 test-mujoco4: smoke-mujoco4
 	$(NEXT_BIN)/python -m pytest -m 'not slow' -k 'flex or geds' $(PYTEST_ARGS) \

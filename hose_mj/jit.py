@@ -61,6 +61,7 @@ _NO_C = _keep_known(no_cfunc_wrapper=True)
 # The versions of numba under which code is linked as is (`_LinkedLibrary`), which overrides what is
 # not public there; under others it is compiled twice, in twice the time.
 _LINKS = numba.version_info[:2] in {(0, 68)}
+_SMALL = ("hose_mj.tasks.", "hose_mj.envs.", "hose_learning.")
 # To be called from Python: unpacking a hose's hundred arrays is more code than most kernels.
 _NO_PYTHON = _keep_known(no_cpython_wrapper=True)
 _OPTIONS |= _NO_C
@@ -165,7 +166,9 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         made = numba.njit(**{**_OPTIONS, **options})(function)
         _name_cache(made, "")
         _MADE.add(made)
-        if _LINKS and _NO_PYTHON and hasattr(made, "get_call_template"):
+        # A hose's records are large, so unpacking them is dear; the grid's are small.
+        is_dear = not function.__module__.startswith(_SMALL)
+        if is_dear and _LINKS and _NO_PYTHON and hasattr(made, "get_call_template"):
             _serve_callers(made, function, options)
         return made
 

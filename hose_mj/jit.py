@@ -58,9 +58,10 @@ def _keep_known(**options: bool) -> dict[str, bool]:
 _BARE = _keep_known(_nrt=False)
 # To be called from C: nobody does that here.
 _NO_C = _keep_known(no_cfunc_wrapper=True)
-# The versions of numba under which code is linked as is (`_LinkedLibrary`), which overrides what is
-# not public there; under others it is compiled twice, in twice the time.
+# The versions of numba under which code is linked as is (`_LinkedLibrary`, which overrides what is
+# not public there); under others each kernel gets its wrappers too, in twice the time.
 _LINKS = numba.version_info[:2] in {(0, 68)}
+# Where records are small: linking a second version costs more than it saves.
 _SMALL = ("hose_mj.tasks.", "hose_mj.envs.", "hose_learning.")
 # To be called from Python: unpacking a hose's hundred arrays is more code than most kernels.
 _NO_PYTHON = _keep_known(no_cpython_wrapper=True)
@@ -166,7 +167,6 @@ def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         made = numba.njit(**{**_OPTIONS, **options})(function)
         _name_cache(made, "")
         _MADE.add(made)
-        # A hose's records are large, so unpacking them is dear; the grid's are small.
         is_dear = not function.__module__.startswith(_SMALL)
         if is_dear and _LINKS and _NO_PYTHON and hasattr(made, "get_call_template"):
             _serve_callers(made, function, options)

@@ -18,7 +18,7 @@ from hose_mj.recording.document import make_document, print_document
 SCHEMES = ("bdf2", "backward-euler", "sdirk2", "midpoint")
 """Verlet wants a step of its own, see `_use_verlet`."""
 NAMED_LEARNERS = {"line": "thresholded-msav"}
-"""The learner that warms a task, where that is not d-rr-ql; every learner has its turn on maze."""
+"""The learner that warms a task, where that is not d-rr-ql; all learners warm corridor or taxi."""
 
 Job = Callable[[], Any]
 
@@ -96,12 +96,12 @@ def _use_hose(**options: Any) -> None:
     hold = hose.attach(1.0)
     hose.step(2)
     hose.move(hold, (0.999, 0.0, 1.0))
-    hose.add_floor(0.0)
+    hose.contacts.add_floor(0.0)
     hose.step(2)
     hose.apply_force(0.5, (0.0, 0.0, -0.1))
     hose.solve_static()
     hose.linearize()
-    hose.energies(), hose.momentum(), hose.reaction(hold), hose.contact_reactions()
+    hose.energies(), hose.momentum(), hose.reaction(hold), hose.contacts.list_reactions()
     for query in (hose.position, hose.velocity, hose.tangent, hose.tension, hose.curvature):
         query([0.0, 0.5])
 

@@ -13,7 +13,7 @@ SB3 = "sb3-contrib is not installed: it comes with the extra deep"
 
 @pytest.fixture
 def example():
-    return re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
+    return re.search(r"```python[^\n]*\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
 
 
 def test_the_example_is_python_and_says_how_long_it_trains(example):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import warnings
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError, check_choice
 from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.protocol import Array
-from hose_mj.hoses.spec import check_number
+from hose_mj.hoses.spec import HoseSpec, check_number
 
 KINDS = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
 """Shapes, and how many of the three sizes each reads; a plane is infinite."""
@@ -76,20 +77,21 @@ class ContactLaw:
 
     With g the gap between the surfaces, w the width and k the stiffness, the normal force per
     length is 0 above g = w, k (w - g)^2 / (4 w) between w and -w, and -k g below: its slope is
-    continuous. Friction per length is friction times that, times v / sqrt(v^2 + slip_speed^2)
-    against the slip v: below the slip speed a hose creeps where Coulomb's law would hold it.
+    continuous. The default law hardens from a tenth of the radius on. Friction holds what does not
+    slide by a spring of `stick_stiffness` along the surface; from friction times the normal force
+    on it slides, by Coulomb's law.
 
     Attributes:
-        stiffness: k (N/m^2). By default the hose's own weight per length (at 9.81 m/s^2, or the
-            hose's gravity where that is more) sinks it by `SINK` of its radius.
-        width: w (m); by default the depth to which the weight sinks.
+        stiffness: k (N/m^2). By default that of the hose's own section, EA / (pi r^2).
+        width: w (m); by default 0.02 of the radius.
         damping_time: the normal force grows by this times its slope times the closing speed (s),
             and never pulls; by default critical, 2 sqrt(linear density / k).
-        slip_speed: m/s.
+        stick_stiffness: kt (N/m^2); by default k / 10.
         points_per_span: contact is looked for at so many points in each span of the spline; None
-            for 3, with self-contact for as many as bring them within a radius of each other.
+            for as many as stand within a radius of each other.
         self_contact: whether the hose may touch itself, without friction; its stiffness is tied to
             the time step dt: 2 linear density / dt^2, see geds/self_contact.py.
+        slip_speed: of no effect since friction holds; goes on for one release.
 
     Raises:
         InputError: a value outside its range.
@@ -98,24 +100,54 @@ class ContactLaw:
     stiffness: float | None = None
     width: float | None = None
     damping_time: float | None = None
-    slip_speed: float = 1e-3
+    stick_stiffness: float | None = None
     points_per_span: int | None = None
     self_contact: bool = False
+    slip_speed: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "width"):
+        for name in ("stiffness", "width", "stick_stiffness"):
             if getattr(self, name) is not None:
                 check_number(f"contact {name}", getattr(self, name))
         if self.damping_time is not None:
             check_number("contact damping_time", self.damping_time, may_be_zero=True)
-        check_number("slip_speed", self.slip_speed)
+        if self.slip_speed is not None:
+            check_number("slip_speed", self.slip_speed)
+            warnings.warn(
+                "ContactLaw.slip_speed has no effect: friction holds; see stick_stiffness",
+                DeprecationWarning,
+                stacklevel=3,
+            )
         if self.points_per_span is not None:
             check_count("points_per_span", self.points_per_span, 1, MOST_POINTS)
 
+    def complete(self, spec: HoseSpec) -> ContactLaw:
+        """Returns the law of a hose, with the numbers that were left to it."""
+        k, width, damping, stick = self.stiffness, self.width, self.damping_time, None
+        if k is None:
+            k = spec.axial_stiffness / (np.pi * spec.outer_radius**2)
+        if width is None:
+            width = _WIDTH * spec.outer_radius
+        if damping is None:
+            damping = 2.0 * np.sqrt(spec.linear_density / k)
+        stick = _SOFTER * k if self.stick_stiffness is None else self.stick_stiffness
+        numbers = {"stiffness": k, "width": width, "damping_time": damping}
+        return replace(self, **numbers, stick_stiffness=stick, slip_speed=None)
 
-SINK = 0.003
-"""Depth to which a hose sinks into a floor under its own weight, by its radius."""
-MOST_POINTS = 16
+    def find_gap(self, load: float) -> float:
+        """The gap between the surfaces (m) at which a complete law carries a load (N/m).
+
+        Of what its ramp carries: half of k times the width at most, far above a hose's weight.
+        """
+        assert self.stiffness is not None and self.width is not None
+        return float(self.width - np.sqrt(4.0 * self.width * load / self.stiffness))
+
+
+_WIDTH = 0.02
+"""Of the radius: where the default law begins. A tenth of it costs twice the iterations."""
+_SOFTER = 0.1
+"""What sticks is softer along a surface than across it by this, by default: quieter at stops."""
+MOST_POINTS = 1000
 """Contact points in a span at most."""
 
 

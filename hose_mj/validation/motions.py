@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.obstacles import SINK, ContactLaw, Obstacle
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation import reference
@@ -183,7 +183,6 @@ def make_capstan() -> Case:
         obstacles=(
             Obstacle(kind="cylinder", rotation=ACROSS, size=(drum, 0.2), friction=friction),
         ),
-        contact_law=ContactLaw(stiffness=1e5),
         promised={20: 0.01},
     )
 
@@ -279,7 +278,8 @@ def compute_tow() -> Reference:
 
 def make_floor_tow() -> Case:
     """A hose towed slowly along a figure of eight on a rough floor."""
-    height = _TOWED.outer_radius * (1.0 - SINK)
+    law = ContactLaw().complete(_TOWED)
+    height = _TOWED.outer_radius + law.find_gap(9.81 * _TOWED.linear_density)
 
     def lay(hose: HoseModel) -> list[Hold]:
         hose.reset([[0.0, 0.0, height], [LENGTH, 0.0, height]])
@@ -297,7 +297,6 @@ def make_floor_tow() -> Case:
         models=("geds", "cable"),
         steps=(0.1, 0.05),
         obstacles=(Obstacle(kind="plane", friction=TOW_FRICTION),),
-        contact_law=ContactLaw(slip_speed=3e-5),
         planar=False,
         reference=compute_tow,
         uncertainty=2e-3,

@@ -90,9 +90,9 @@ def set_random_obstacles(hose: GedsHose, rng: np.random.Generator) -> None:
         friction = float(rng.uniform(0.0, 2.0))
         obstacles.append(Obstacle(kind=kind, position=place, size=size, friction=friction))
     stiffness = float(10.0 ** rng.uniform(3.0, 6.0))
-    slip_speed = float(10.0 ** rng.uniform(-4.0, -2.0))
+    stick = float(10.0 ** rng.uniform(2.0, 6.0))
     self_contact = bool(rng.random() < 0.5)
-    law = ContactLaw(stiffness=stiffness, slip_speed=slip_speed, self_contact=self_contact)
+    law = ContactLaw(stiffness=stiffness, stick_stiffness=stick, self_contact=self_contact)
     hose.set_obstacles(obstacles, law)
 
 

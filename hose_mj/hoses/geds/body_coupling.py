@@ -65,7 +65,8 @@ class BodyCoupling:
     def accept_step(self) -> None:
         """Makes the step of the last `try_step` count."""
         d = self._dynamics
-        integrators.accept_step(*(d.axes, d.hose, d.constraints.rows, self._trial, d.state))
+        arguments = (d.axes, d.hose, d.constraints.rows, d.loads.loads, self._trial, d.state)
+        integrators.accept_step(*arguments)
         d.counts[STEPS] += 1
 
     def compute_positions(self) -> Array:

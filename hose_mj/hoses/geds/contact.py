@@ -1,23 +1,10 @@
-"""Contact of the spline with rigid shapes: a smoothed penalty and smoothed Coulomb friction.
+"""Contact of the spline with rigid shapes: forces, their matrix, and what friction remembers.
 
-The force per length of contact_law.py acts at contact points spread over the spans, all of it taken
-at the end of the stage. In the matrix stand the parts that leave it positive semidefinite: the
-slope of N along n, and for friction mu N / (h s) (1 - n n^T - (w v^T + v w^T) / 2) with
-s = sqrt(u_t^2 + eps^2), v = u_t / s and w the same at the stage's base: close to the true
-derivative while the hose slides or sticks, and stiff where the slip turns over within a step (the
-idea of Chan, Golub, Mulet 1999). With `exact` also the curvature of the shape, which softens. Left
-out is how friction grows with N: it is not symmetric.
-
-A hose that touches itself: a frictionless penalty between contact points and the polyline that
-joins them. Each is pushed away from every other part of it that comes closer than two radii, by
-half of k max(0, S(g) - tau S'(g) u.n) per length at the place nearest on it, where the same force
-acts the other way: linear and angular momentum are exact. The other half comes from that part's own
-points. Parts nearer than `REACH` radii of arc, either way round a closed loop, do not touch.
-
-The matrix gets only the blocks on the band: how a force here depends on a place far along the hose
-is left out. Newton's iteration then converges by k (1 + tau / h) over that plus rho / h^2 at each
-turn, so k is tied to the time step: 2 rho / dt^2, tau = dt / 4, a factor of .55 with BDF2 and .71
-with backward Euler at worst.
+The force per length of contact_law.py acts at contact points that stand at most a radius apart, all
+of it taken at the end of the stage. In the matrix stand the parts that leave it positive
+semidefinite: the slope of N along n, and for friction kt across n where a point sticks,
+mu N / |z| across n and the slide where it slides. With `exact` also the curvature of the shape,
+which softens. Left out is how friction grows with N: it is not symmetric.
 """
 
 from __future__ import annotations
@@ -26,156 +13,337 @@ import numpy as np
 
 from hose_mj.hoses.geds.contact_law import (
     DAMPING,
+    DEEPEST,
+    IMPACTS,
+    MARGIN,
     RADIUS,
-    ROUND,
-    SELF_DAMPING,
-    SELF_STIFFNESS,
-    WIDTH,
-    compute_force,
-    compute_gap,
-    evaluate,
-    is_skipped,
-    is_span_near,
-    make_push,
+    SLOTS,
+    STAGE,
+    STICK,
+    TIMESTEP,
+    TOUCHED,
+    Motion,
+    press,
+    rub,
 )
 from hose_mj.hoses.geds.shapes import POSITION, SCALE
+from hose_mj.hoses.geds.touch import (
+    _FAST,
+    compute_gap,
+    compute_surface_move,
+    compute_surface_velocity,
+    evaluate,
+    find_next,
+    find_span,
+    is_skipped,
+    is_span_near,
+)
 from hose_mj.jit import compiled, inlined, kernel
 
-REACH = 6.0
-"""Arc between parts of a hose that may touch each other, in radii."""
+_IMPACT = 0.05
+"""A point that newly touches faster than this (m/s) ends BDF2's memory: it would bring back the
+speed from before the wall, and energy with it."""
 
 
 @kernel
-def _relate(velocity, surface):
-    return velocity[0] - surface[0], velocity[1] - surface[1], velocity[2] - surface[2]
+def _find_slot(memory, q, g):
+    """Where friction remembers geom g at contact point q, -1 for nowhere."""
+    for slot in range(SLOTS):
+        if memory[q, slot, 0] == g + 2.0:
+            return slot
+    return -1
+
+
+@kernel
+def _compute_force(axes, contact, q, g, start, touch, motion, is_trial):
+    """Force per length at a point and what makes its matrix.
+
+    In a trial, one of Newton's, a point that slid one way and now would slide back is taken to
+    stick, whatever that takes: the next trial tells whether it can.
+
+    Returns force (3,), N, its slope, what of z is left (3,), direction of the slide (3,) and the
+    stiffness across it.
+    """
+    gap, normal, _, friction, point = touch
+    zero = (0.0, 0.0, 0.0)
+    if g < 0:
+        row, scale = contact.given, 1.0
+        surface = (row[q, 5], row[q, 6], row[q, 7])
+    else:
+        scale = contact.geoms[g, SCALE]
+        surface = compute_surface_velocity(contact.geoms, g, point)
+    away = 0.0
+    if motion.step < np.inf:
+        v = evaluate(axes, contact.points, q, start, motion.rate)
+        for c in range(3):
+            away += normal[c] * (v[c] - surface[c])
+    N, slope = press(contact.law, scale, gap, away)
+    force = (N * normal[0], N * normal[1], N * normal[2])
+    if N == 0.0 or friction == 0.0 or motion.step == np.inf:
+        return force, N, slope, zero, zero, 0.0
+    before = evaluate(axes, contact.points, q, start, motion.start)
+    move = compute_surface_move(contact, q, g, point, motion.elapsed)
+    z = (
+        point[0] - before[0] - move[0],
+        point[1] - before[1] - move[1],
+        point[2] - before[2] - move[2],
+    )
+    slot = _find_slot(contact.memory, q, g)
+    if slot >= 0:
+        m = contact.memory
+        z = (z[0] + m[q, slot, 1], z[1] + m[q, slot, 2], z[2] + m[q, slot, 3])
+    up = z[0] * normal[0] + z[1] * normal[1] + z[2] * normal[2]
+    z = (z[0] - up * normal[0], z[1] - up * normal[1], z[2] - up * normal[2])
+    stick, limit = scale * contact.law[STICK], friction * N
+    held, left, slide, stiffness = rub(stick, limit, z)
+    if is_trial and _turns_back(contact, q, g, slide):
+        held, left, slide, stiffness = rub(stick, np.inf, z)
+    force = (force[0] + held[0], force[1] + held[1], force[2] + held[2])
+    return force, N, slope, left, slide, stiffness
+
+
+@kernel
+def _turns_back(contact, q, g, slide):
+    """Whether a point slides against where it slid at the stage's build before; remembers it."""
+    slides, stage = contact.slides, contact.found[STAGE]
+    if slide[0] == 0.0 and slide[1] == 0.0 and slide[2] == 0.0:
+        return False
+    free = -1
+    for slot in range(SLOTS):
+        if slides[q, slot, 1] != stage:
+            free = slot
+        elif slides[q, slot, 0] == g + 2.0:
+            along = 0.0
+            for c in range(3):
+                along += slides[q, slot, 2 + c] * slide[c]
+            back = along < 0.0
+            for c in range(3):
+                slides[q, slot, 2 + c] = 0.0 if back else slide[c]
+            return back
+    if free >= 0:
+        slides[q, free, 0], slides[q, free, 1] = g + 2.0, stage
+        for c in range(3):
+            slides[q, free, 2 + c] = slide[c]
+    return False
 
 
 @inlined
-def add_contact(axes, contact, x, rate, base, step, exact, gradient, band):
+def add_contact(axes, contact, x, motion, exact, gradient, band):
     """Adds contact to the residual and its matrix; returns how many contact points touch.
-
-    Nine arguments, as in `energy.assemble`, which it follows.
 
     Args:
         axes: (0.0,) * d.
-        contact: what may be touched.
+        contact: what may be touched; the linear model of each force goes into its `pairs`.
         x: control points, flat.
-        rate: their velocity.
-        base: their velocity before the stage.
-        step: the stage's length (s); where it is infinite (statics) nothing rubs.
+        motion: how they got there.
         exact: whether the curvature of shapes enters the matrix.
         gradient: added to.
         band: added to.
     """
-    n_contacts = 0
-    d = len(axes)
-    n_spans = len(x) // d - 3
-    per_span = contact.points.shape[0] // n_spans
+    law = contact.law
+    n_contacts, n_pairs = 0, 0
     first = -1 if contact.given.shape[0] > 0 else 0
-    for e in range(n_spans):
-        start = e * d
+    for e in range(len(contact.first) - 1):
+        start, n_before = e * len(axes), n_contacts
+        ball = find_span(axes, contact, e, x, motion.start)
+        is_fast = motion.step < np.inf and ball[2] > _FAST * law[RADIUS]
         for g in range(first, contact.geoms.shape[0]):
-            if not is_span_near(axes, contact, e, g, x):
+            if not is_span_near(contact, g, ball):
                 continue
-            for q in range(e * per_span, (e + 1) * per_span):
-                if is_skipped(contact, q, g):
+            q, end = contact.first[e], contact.first[e + 1]
+            while q < end:
+                at = q
+                if is_skipped(contact, at, g):
+                    q += 1
                     continue
-                gap, normal, bend, friction, surface = compute_gap(axes, contact, q, g, start, x)
-                if gap >= contact.law[WIDTH]:
+                touch = compute_gap(axes, contact, at, g, start, x, motion, is_fast)
+                q = q + 1 if is_fast else find_next(contact, at, end, touch[0], ball[3])
+                if touch[0] >= law[MARGIN]:
                     continue
-                velocity = evaluate(axes, contact.points, q, start, rate)
-                if step == np.inf:
-                    velocity = surface
-                relative = _relate(velocity, surface)
-                scale = contact.geoms[g, SCALE] if g >= 0 else 1.0
-                force, N, slope, slip, s = compute_force(
-                    contact.law, scale, gap, normal, friction, relative
-                )
+                answer = _compute_force(axes, contact, at, g, start, touch, motion, True)
+                force, N = answer[0], answer[1]
+                matrix = _make_matrix(contact, touch, answer, motion.step, exact)
+                n_pairs = _keep_pair(contact, n_pairs, (at, g, e), force, matrix, touch[4])
                 if N == 0.0:
                     continue
+                if n_contacts == n_before:
+                    contact.block[:, :] = 0.0
                 n_contacts += 1
-                matrix = _press(normal, slope * (1.0 + contact.law[DAMPING] / step))
-                if exact:
-                    matrix = _soften(matrix, normal, bend, N)
-                if friction > 0.0 and step < np.inf:
-                    before = _relate(evaluate(axes, contact.points, q, start, base), surface)
-                    _, _, _, usual, _ = compute_force(
-                        contact.law, scale, gap, normal, friction, before
-                    )
-                    matrix = _rub(matrix, normal, slip, usual, friction * N / (step * s))
-                share = contact.points[q, 4]
-                force, matrix = _scale3(share, force), _scale6(share, matrix)
-                _scatter(axes, contact.points, q, start, force, matrix, gradient, band)
+                _gather(axes, contact, at, start, force, matrix, gradient)
+        if n_contacts > n_before:
+            _scatter_block(axes, contact.block, start, band)
+    contact.found[TOUCHED] = n_pairs
     return n_contacts
 
 
 @kernel
-def _scale3(c, v):
-    return c * v[0], c * v[1], c * v[2]
+def _keep_pair(contact, k, names, force, matrix, point):
+    """Remembers the linear model of one point's force; returns how many there are now."""
+    pairs = contact.pairs
+    if k < pairs.shape[0]:
+        pairs[k, 0], pairs[k, 1], pairs[k, 14] = names[0], names[1], names[2]
+        for c in range(3):
+            pairs[k, 2 + c] = force[c]
+            pairs[k, 11 + c] = point[c]
+        for c in range(6):
+            pairs[k, 5 + c] = matrix[c]
+    return k + 1
 
 
 @kernel
-def _scale6(c, m):
-    return c * m[0], c * m[1], c * m[2], c * m[3], c * m[4], c * m[5]
-
-
-@kernel
-def _press(n, stiffness):
-    """stiffness n n^T as (00, 11, 22, 01, 02, 12)."""
+def _make_matrix(contact, touch, answer, step, exact):
+    """Stiffness per length of one point as (00, 11, 22, 01, 02, 12)."""
+    _, n, (bend, a), _, _ = touch
+    _, N, slope, _, e, across = answer
+    if N == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    along = slope * (1.0 + contact.law[DAMPING] / step) - across
+    flat = across
+    if exact:
+        # Less N times the Hessian of the distance.
+        flat -= N * bend[0]
+        along += N * bend[0]
+        r = N * (bend[1] - bend[0])
+    else:
+        r = 0.0
     return (
-        stiffness * n[0] * n[0],
-        stiffness * n[1] * n[1],
-        stiffness * n[2] * n[2],
-        stiffness * n[0] * n[1],
-        stiffness * n[0] * n[2],
-        stiffness * n[1] * n[2],
+        flat + along * n[0] * n[0] - across * e[0] * e[0] - r * a[0] * a[0],
+        flat + along * n[1] * n[1] - across * e[1] * e[1] - r * a[1] * a[1],
+        flat + along * n[2] * n[2] - across * e[2] * e[2] - r * a[2] * a[2],
+        along * n[0] * n[1] - across * e[0] * e[1] - r * a[0] * a[1],
+        along * n[0] * n[2] - across * e[0] * e[2] - r * a[0] * a[2],
+        along * n[1] * n[2] - across * e[1] * e[2] - r * a[1] * a[2],
     )
 
 
 @kernel
-def _soften(m, n, bend, N):
-    """Subtracts N times the Hessian of the distance."""
-    (across, along), a = bend
-    c = N * across
-    r = N * (along - across)
-    return (
-        m[0] - c * (1.0 - n[0] * n[0]) - r * a[0] * a[0],
-        m[1] - c * (1.0 - n[1] * n[1]) - r * a[1] * a[1],
-        m[2] - c * (1.0 - n[2] * n[2]) - r * a[2] * a[2],
-        m[3] + c * n[0] * n[1] - r * a[0] * a[1],
-        m[4] + c * n[0] * n[2] - r * a[0] * a[2],
-        m[5] + c * n[1] * n[2] - r * a[1] * a[2],
-    )
+def _gather(axes, contact, q, start, force, matrix, gradient):
+    """Adds a point's force to the residual and its matrix to the span's block."""
+    d = len(axes)
+    points, share = contact.points, contact.points[q, 4]
+    row = 0
+    for i in range(4):
+        weight = share * points[q, i]
+        for c in range(len(axes[:3])):
+            gradient[start + i * d + c] -= weight * force[c]
+        for j in range(i + 1):
+            product = weight * points[q, j]
+            for c in range(6):
+                contact.block[row, c] += product * matrix[c]
+            row += 1
 
 
 @kernel
-def _rub(m, n, v, w, c):
-    """Adds c (1 - n n^T - (v w^T + w v^T) / 2)."""
-    return (
-        m[0] + c * (1.0 - n[0] * n[0] - v[0] * w[0]),
-        m[1] + c * (1.0 - n[1] * n[1] - v[1] * w[1]),
-        m[2] + c * (1.0 - n[2] * n[2] - v[2] * w[2]),
-        m[3] - c * (n[0] * n[1] + 0.5 * (v[0] * w[1] + v[1] * w[0])),
-        m[4] - c * (n[0] * n[2] + 0.5 * (v[0] * w[2] + v[2] * w[0])),
-        m[5] - c * (n[1] * n[2] + 0.5 * (v[1] * w[2] + v[2] * w[1])),
-    )
-
-
-@kernel
-def _scatter(axes, points, q, start, force, m, gradient, band):
-    """Adds a force at contact point q and its stiffness m to the span's unknowns."""
+def _scatter_block(axes, block, start, band):
+    """Adds the block of a span to the band."""
     d = len(axes)
     n_coordinates = len(axes[:3])
-    rows = ((m[0], m[3], m[4]), (m[3], m[1], m[5]), (m[4], m[5], m[2]))
+    order = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
+    row = 0
     for i in range(4):
-        for c in range(n_coordinates):
-            gradient[start + i * d + c] -= points[q, i] * force[c]
         for j in range(i + 1):
-            weight = points[q, i] * points[q, j]
             column = start + j * d
             for c1 in range(n_coordinates):
                 for c2 in range(n_coordinates if j < i else c1 + 1):
-                    band[column + c2, (i - j) * d + c1 - c2] += weight * rows[c1][c2]
+                    band[column + c2, (i - j) * d + c1 - c2] += block[row, order[c1][c2]]
+            row += 1
+
+
+@kernel
+def measure_contact_left(axes, contact, x, motion):
+    """Sum over the pairs of the last build of |force at x - its linear model|, N.
+
+    It is what a Newton step to x leaves of the contact's residual; infinite where pairs were lost.
+    """
+    n_pairs = int(contact.found[TOUCHED])
+    pairs = contact.pairs
+    if n_pairs > pairs.shape[0]:
+        return np.inf
+    left = 0.0
+    for k in range(n_pairs):
+        q, g, e = int(pairs[k, 0]), int(pairs[k, 1]), int(pairs[k, 14])
+        start = e * len(axes)
+        moved = 0.0
+        now = evaluate(axes, contact.points, q, start, x)
+        before = evaluate(axes, contact.points, q, start, motion.start)
+        for c in range(3):
+            moved = max(moved, abs(now[c] - before[c]))
+        is_fast = moved > 0.5 * _FAST * contact.law[RADIUS]
+        touch = compute_gap(axes, contact, q, g, start, x, motion, is_fast)
+        force = _compute_force(axes, contact, q, g, start, touch, motion, False)[0]
+        d0, d1, d2 = now[0] - pairs[k, 11], now[1] - pairs[k, 12], now[2] - pairs[k, 13]
+        m = pairs[k]
+        r0 = force[0] - m[2] + m[5] * d0 + m[8] * d1 + m[9] * d2
+        r1 = force[1] - m[3] + m[8] * d0 + m[6] * d1 + m[10] * d2
+        r2 = force[2] - m[4] + m[9] * d0 + m[10] * d1 + m[7] * d2
+        left += contact.points[q, 4] * np.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    return left
+
+
+@kernel
+def accept_contact(axes, contact, state):
+    """Makes friction remember a step that is done; counts impacts and keeps the greatest depth."""
+    law, found = contact.law, contact.found
+    motion = Motion(state.v, state.x_old, law[TIMESTEP], law[TIMESTEP])
+    found[IMPACTS] = 0.0
+    first = -1 if contact.given.shape[0] > 0 else 0
+    for e in range(len(contact.first) - 1):
+        start = e * len(axes)
+        ball = find_span(axes, contact, e, state.x, state.x_old)
+        is_fast = ball[2] > _FAST * law[RADIUS]
+        for q in range(contact.first[e], contact.first[e + 1]):
+            for slot in range(SLOTS):
+                # Below zero: of the step before.
+                contact.memory[q, slot, 0] = -contact.memory[q, slot, 0]
+        for g in range(first, contact.geoms.shape[0]):
+            if not is_span_near(contact, g, ball):
+                continue
+            q, end = contact.first[e], contact.first[e + 1]
+            while q < end:
+                at = q
+                if is_skipped(contact, at, g):
+                    q += 1
+                    continue
+                touch = compute_gap(axes, contact, at, g, start, state.x, motion, is_fast)
+                q = q + 1 if is_fast else find_next(contact, at, end, touch[0], ball[3])
+                if touch[0] < law[MARGIN]:
+                    _remember(axes, contact, at, g, start, touch, motion, state)
+        for q in range(contact.first[e], contact.first[e + 1]):
+            for slot in range(SLOTS):
+                if contact.memory[q, slot, 0] <= 0.0:
+                    for c in range(4):
+                        contact.memory[q, slot, c] = 0.0
+
+
+@kernel
+def _remember(axes, contact, q, g, start, touch, motion, state):
+    """Writes what friction remembers of one point and geom."""
+    memory, found = contact.memory, contact.found
+    found[DEEPEST] = max(found[DEEPEST], -touch[0] / contact.law[RADIUS])
+    slot = -1
+    for k in range(SLOTS):
+        if memory[q, k, 0] == -(g + 2.0):
+            slot = k
+            memory[q, k, 0] = g + 2.0
+    answer = _compute_force(axes, contact, q, g, start, touch, motion, False)
+    if answer[1] == 0.0:
+        if slot >= 0:
+            memory[q, slot, 0] = 0.0
+        return
+    if slot < 0:
+        v = evaluate(axes, contact.points, q, start, state.v_old)
+        closing = 0.0
+        for c in range(3):
+            closing -= v[c] * touch[1][c]
+        if closing > _IMPACT:
+            found[IMPACTS] += 1.0
+        for k in range(SLOTS):
+            if memory[q, k, 0] == 0.0 and slot < 0:
+                slot = k
+    if slot >= 0:
+        memory[q, slot, 0] = g + 2.0
+        for c in range(3):
+            memory[q, slot, 1 + c] = answer[3][c]
 
 
 @compiled
@@ -186,166 +354,40 @@ def compute_forces(axes, contact, x, v, forces, reactions):
     geom, (G, 6): force (N) and moment about the geom's position (N m), of forces that act at the
     hose's centre line. In the hose's coordinates.
     """
-    d = len(axes)
-    n_spans = len(x) // d - 3
-    per_span = contact.points.shape[0] // n_spans
+    # Nothing moves any more: friction is what it remembers.
+    motion = Motion(v, x, contact.law[TIMESTEP], 0.0)
     first = -1 if contact.given.shape[0] > 0 else 0
     forces[:, :] = 0.0
     reactions[:, :] = 0.0
-    for g in range(first, contact.geoms.shape[0]):
-        for e in range(n_spans):
-            start = e * d
-            if not is_span_near(axes, contact, e, g, x):
+    for e in range(len(contact.first) - 1):
+        start = e * len(axes)
+        ball = find_span(axes, contact, e, x, x)
+        for g in range(first, contact.geoms.shape[0]):
+            if not is_span_near(contact, g, ball):
                 continue
-            for q in range(e * per_span, (e + 1) * per_span):
-                if is_skipped(contact, q, g):
+            q, end = contact.first[e], contact.first[e + 1]
+            while q < end:
+                at = q
+                if is_skipped(contact, at, g):
+                    q += 1
                     continue
-                gap, normal, _, friction, surface = compute_gap(axes, contact, q, g, start, x)
-                velocity = evaluate(axes, contact.points, q, start, v)
-                relative = _relate(velocity, surface)
-                scale = contact.geoms[g, SCALE] if g >= 0 else 1.0
-                force = compute_force(contact.law, scale, gap, normal, friction, relative)[0]
-                weight = contact.points[q, 4]
-                for c in range(3):
-                    forces[q, c] += weight * force[c]
-                if g < 0:
-                    continue
-                point = evaluate(axes, contact.points, q, start, x)
-                for c in range(3):
-                    c1, c2 = (c + 1) % 3, (c + 2) % 3
-                    arm1 = point[c1] - contact.geoms[g, POSITION + c1]
-                    arm2 = point[c2] - contact.geoms[g, POSITION + c2]
-                    reactions[g, c] -= weight * force[c]
-                    reactions[g, 3 + c] -= weight * (arm1 * force[c2] - arm2 * force[c1])
+                touch = compute_gap(axes, contact, at, g, start, x, motion, False)
+                q = find_next(contact, at, end, touch[0], ball[3])
+                if touch[0] < contact.law[MARGIN]:
+                    answer = _compute_force(axes, contact, at, g, start, touch, motion, False)
+                    _add_reaction(contact, at, g, answer[0], touch[4], forces, reactions)
 
 
 @kernel
-def _load_places(axes, contact, per_span, x):
-    """Writes the places of the contact points, then middle and radius of each span's ball."""
-    d = len(axes)
-    n_points = contact.points.shape[0]
-    room = contact.room
-    for q in range(n_points):
-        y = evaluate(axes, contact.points, q, (q // per_span) * d, x)
-        room[q, 0] = y[0]
-        room[q, 1] = y[1]
-        room[q, 2] = y[2]
-    for e in range(n_points // per_span):
-        first, last = e * per_span, min((e + 1) * per_span, n_points - 1)
-        square = 0.0
-        for c in range(3):
-            middle = 0.5 * (room[first, c] + room[last, c])
-            room[n_points + e, c] = middle
-        for q in range(first, last + 1):
-            away = 0.0
-            for c in range(3):
-                away += (room[q, c] - room[n_points + e, c]) ** 2
-            square = max(square, away)
-        room[n_points + e, 3] = np.sqrt(square)
-
-
-@kernel
-def _find_nearest(room, q, j):
-    """Squared distance of contact point q from the segment from point j to j + 1; where on it."""
-    square = 0.0
-    along = 0.0
+def _add_reaction(contact, q, g, force, point, forces, reactions):
+    weight = contact.points[q, 4]
     for c in range(3):
-        side = room[j + 1, c] - room[j, c]
-        square += side * side
-        along += side * (room[q, c] - room[j, c])
-    # A segment without length is nearest at its start.
-    t = min(max(along / max(square, 1e-300), 0.0), 1.0)
-    distance = 0.0
-    for c in range(3):
-        near = room[j, c] + t * (room[j + 1, c] - room[j, c])
-        distance += (room[q, c] - near) ** 2
-    return distance, t
-
-
-@kernel
-def _are_spans_apart(contact, e, f):
-    room = contact.room
-    base = contact.points.shape[0]
-    reach = room[base + e, 3] + room[base + f, 3] + 2.0 * contact.law[RADIUS] + contact.law[WIDTH]
-    square = 0.0
-    for c in range(3):
-        square += (room[base + e, c] - room[base + f, c]) ** 2
-    return square > reach * reach
-
-
-@inlined
-def add_self_contact(axes, contact, x, rate, step, gradient, band):
-    """Adds the forces of a hose on itself to the residual and what is on the band to the matrix.
-
-    Returns how many pairs touch. The cost grows with the square of the number of spans, and with
-    that of the contact points where spans are near each other. Statics know no self-contact.
-    """
-    if contact.law[SELF_STIFFNESS] == 0.0 or step == np.inf:
-        return 0
-    n_spans = len(x) // len(axes) - 3
-    per_span = contact.points.shape[0] // n_spans
-    n_segments = contact.points.shape[0] - 1
-    _load_places(axes, contact, per_span, x)
-    room = contact.room
-    n_contacts = 0
-    for e in range(n_spans):
-        for f in range(n_spans):
-            if _are_spans_apart(contact, e, f):
-                continue
-            for q in range(e * per_span, (e + 1) * per_span):
-                for j in range(f * per_span, min((f + 1) * per_span, n_segments)):
-                    gap_in_arc = max(contact.arcs[j] - contact.arcs[q], 0.0)
-                    gap_in_arc = max(gap_in_arc, contact.arcs[q] - contact.arcs[j + 1])
-                    far = max(
-                        contact.arcs[j + 1] - contact.arcs[q], contact.arcs[q] - contact.arcs[j]
-                    )
-                    gap_in_arc = min(gap_in_arc, contact.law[ROUND] - far)
-                    if gap_in_arc < REACH * contact.law[RADIUS]:
-                        continue
-                    square, t = _find_nearest(room, q, j)
-                    reach = 2.0 * contact.law[RADIUS] + contact.law[WIDTH]
-                    if square >= reach * reach:
-                        continue
-                    # Of neighbouring segments only the nearest counts, the first where they tie.
-                    if j > 0 and _find_nearest(room, q, j - 1)[0] <= square:
-                        continue
-                    if j + 1 < n_segments and _find_nearest(room, q, j + 1)[0] < square:
-                        continue
-                    _push_apart(axes, contact, (q, j, t, per_span), rate, step, gradient, band)
-                    n_contacts += 1
-    return n_contacts
-
-
-@kernel
-def _push_apart(axes, contact, pair, rate, step, gradient, band):
-    """One pair: contact point q and the place t on the segment from point j."""
-    q, j, t, per_span = pair
-    d = len(axes)
-    room = contact.room
-    points = contact.points
-    n0 = room[q, 0] - (1.0 - t) * room[j, 0] - t * room[j + 1, 0]
-    n1 = room[q, 1] - (1.0 - t) * room[j, 1] - t * room[j + 1, 1]
-    n2 = room[q, 2] - (1.0 - t) * room[j, 2] - t * room[j + 1, 2]
-    # Centre lines that meet have no normal and do not push.
-    distance = max(np.sqrt(n0 * n0 + n1 * n1 + n2 * n2), 1e-9)
-    normal = (n0 / distance, n1 / distance, n2 / distance)
-    start_q, start_j = (q // per_span) * d, (j // per_span) * d
-    start_k = ((j + 1) // per_span) * d
-    v = evaluate(axes, points, q, start_q, rate)
-    a = evaluate(axes, points, j, start_j, rate)
-    b = evaluate(axes, points, j + 1, start_k, rate)
-    away = 0.0
-    for c in range(3):
-        away += normal[c] * (v[c] - (1.0 - t) * a[c] - t * b[c])
-    push, slope = make_push(contact.law[WIDTH], distance - 2.0 * contact.law[RADIUS])
-    damping = contact.law[SELF_DAMPING]
-    N = 0.5 * contact.law[SELF_STIFFNESS] * max(push - damping * slope * away, 0.0)
-    if N == 0.0:
+        forces[q, c] += weight * force[c]
+    if g < 0:
         return
-    stiffness = 0.5 * contact.law[SELF_STIFFNESS] * slope * (1.0 + damping / step)
-    length = points[q, 4]
-    for at, start, share in ((q, start_q, 1.0), (j, start_j, t - 1.0), (j + 1, start_k, -t)):
-        weight = length * share
-        force = (weight * N * normal[0], weight * N * normal[1], weight * N * normal[2])
-        matrix = _press(normal, length * abs(share) * stiffness)
-        _scatter(axes, points, at, start, force, matrix, gradient, band)
+    for c in range(3):
+        c1, c2 = (c + 1) % 3, (c + 2) % 3
+        arm1 = point[c1] - contact.geoms[g, POSITION + c1]
+        arm2 = point[c2] - contact.geoms[g, POSITION + c2]
+        reactions[g, c] -= weight * force[c]
+        reactions[g, 3 + c] -= weight * (arm1 * force[c2] - arm2 * force[c1])

@@ -14,7 +14,7 @@ from hose_mj.hoses.geds import basis, contact, contact_law, shapes
 from hose_mj.hoses.geds.integrators import State
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count
-from hose_mj.hoses.obstacles import MOST_POINTS, SINK, ContactLaw, Obstacle
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
 
@@ -25,9 +25,11 @@ _CODES = {
     "cylinder": shapes.CYLINDER,
     "box": shapes.BOX,
 }
-TIGHTER = 0.1
-"""While something touches, Newton goes on until moves are below this part of the law's width, and
-of the way that the slip speed goes in a step."""
+_HARDENING = 0.1
+"""From this part of the radius on the default law hardens: twice as hard there, five times at two
+such depths, so that what breaks the hose does not cut it."""
+_SPARE = 64
+"""Room for pairs beyond two surfaces at every contact point."""
 
 
 class ContactSet:
@@ -36,8 +38,8 @@ class ContactSet:
     Args:
         spline: the hose's geometry.
         spec: the hose.
-        gravity: (3,) m/s^2, for the default stiffness.
-        timestep: s, for the tolerance.
+        tolerance: how far a control point may still move when Newton's iteration ends (m).
+        timestep: s.
         state: the hose's, read where forces are asked for.
         scheme: the hose's integrator: contact is too stiff for an explicit one.
 
@@ -53,20 +55,25 @@ class ContactSet:
     obstacles: tuple[Obstacle, ...]
     arc_lengths: Array
     _points: Array
+    _first: np.ndarray
+    _memory: Array
+    _slides: Array
+    _pairs: Array
+    _block: Array
+    _found: Array
+    _room: Array
 
     def __init__(
         self,
         spline: Spline,
         spec: HoseSpec,
-        gravity: Array,
+        tolerance: float,
         timestep: float,
         state: State,
         scheme: str = "bdf2",
     ) -> None:
         self._spline, self._spec, self._timestep = spline, spec, timestep
-        self._state, self._scheme = state, scheme
-        # Without gravity a hose is still pressed against things: as if by its weight on Earth.
-        self._pull = max(9.81, float(np.linalg.norm(gravity)))
+        self._state, self._scheme, self._tolerance = state, scheme, tolerance
         self._is_closed = False
         # The hose's coordinates first: a reflection where that is an odd permutation.
         rest = [c for c in range(3) if c not in spline.dims]
@@ -224,6 +231,11 @@ class ContactSet:
         self._capsules[:, shapes.SCALE] = stiffness / self._numbers[contact_law.STIFFNESS]
         self._rebuild()
 
+    def forget(self) -> None:
+        """Lets go of what friction holds, and of the greatest depth."""
+        self._memory[:] = 0.0
+        self._found[:] = 0.0
+
     def set_closed(self, is_closed: bool) -> None:
         """Says whether the hose is a closed loop, whose ends do not touch each other."""
         self._is_closed = is_closed
@@ -308,6 +320,7 @@ class ContactSet:
             "law": asdict(self.law),
             "given": self._given.copy(),
             "capsules": self._capsules.copy(),
+            "memory": self._memory.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -315,6 +328,7 @@ class ContactSet:
         self._set([Obstacle(**one) for one in state["obstacles"]], ContactLaw(**state["law"]))
         self._given = state["given"].copy()
         self._capsules = state["capsules"].copy()
+        self._memory[:] = state["memory"]
         self._rebuild()
 
     # -- inside ----------------------------------------------------------------------------------
@@ -329,15 +343,27 @@ class ContactSet:
         self._given = np.zeros((0, contact_law.GIVEN))
         self._capsules = np.zeros((0, shapes.ROW))
         self._numbers = self._make_law()
-        self.arc_lengths, self._points = self._make_points()
+        self._make_points()
         self._rebuild()
 
     def _rebuild(self) -> None:
         """Makes what the kernels read."""
         geoms = np.concatenate([self.make_shapes(self.obstacles), self._capsules])
-        room = np.zeros((len(self._points) + self._spline.n_control_points - basis.DEGREE, 4))
+        knots = self._spline.knots
         self.contact = contact_law.Contact(
-            self._points, geoms, self._given, self._numbers, self.arc_lengths, room
+            points=self._points,
+            first=self._first,
+            slopes=basis.DEGREE / (knots[4:-1] - knots[1:-4]),
+            geoms=geoms,
+            given=self._given,
+            law=self._numbers,
+            arcs=self.arc_lengths,
+            memory=self._memory,
+            slides=self._slides,
+            pairs=self._pairs,
+            block=self._block,
+            found=self._found,
+            room=self._room,
         )
 
     def _compute_local(self, touched: contact_law.Contact) -> tuple[Array, Array]:
@@ -353,39 +379,48 @@ class ContactSet:
         return self._to_world(rows[:, :3]), self._parity * self._to_world(rows[:, 3:])
 
     def _make_law(self) -> Array:
-        law, spec = self.law, self._spec
-        weight = spec.linear_density * self._pull
-        k = weight / (SINK * spec.outer_radius) if law.stiffness is None else law.stiffness
-        width = weight / k if law.width is None else law.width
-        damping = law.damping_time
-        if damping is None:
-            damping = 2.0 * np.sqrt(spec.linear_density / k)
-        numbers = np.zeros(9)
+        spec, radius = self._spec, self._spec.outer_radius
+        law = self.law.complete(spec)
+        hardens = self.law.stiffness is None
+        numbers = np.zeros(contact_law.N_NUMBERS)
         numbers[contact_law.ROUND] = self._spline.length if self._is_closed else np.inf
-        numbers[contact_law.STIFFNESS] = k
-        numbers[contact_law.WIDTH] = width
-        numbers[contact_law.DAMPING] = damping
-        numbers[contact_law.SLIP] = law.slip_speed
-        numbers[contact_law.RADIUS] = spec.outer_radius
-        numbers[contact_law.TOLERANCE] = TIGHTER * min(width, law.slip_speed * self._timestep)
+        numbers[contact_law.STIFFNESS] = law.stiffness
+        numbers[contact_law.WIDTH] = law.width
+        numbers[contact_law.HARDENING] = _HARDENING * radius if hardens else np.inf
+        numbers[contact_law.DAMPING] = law.damping_time
+        numbers[contact_law.STICK] = law.stick_stiffness
+        numbers[contact_law.RADIUS] = radius
+        numbers[contact_law.MARGIN] = numbers[contact_law.WIDTH] + 2.0 * self._tolerance
+        numbers[contact_law.TIMESTEP] = self._timestep
         if law.self_contact:
             numbers[contact_law.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2
             numbers[contact_law.SELF_DAMPING] = 0.25 * self._timestep
         return numbers
 
-    def _make_points(self) -> tuple[Array, Array]:
-        """Gauss points of every span: arc lengths (Q,) and basis values with weights (Q, 5)."""
-        n_spans = self._spline.n_control_points - basis.DEGREE
-        span = self._spline.length / n_spans
-        count = self.law.points_per_span
-        if count is None:
-            wanted = int(np.ceil(span / self._spec.outer_radius)) if self.law.self_contact else 0
-            count = min(max(wanted, 3), MOST_POINTS)
-        nodes, weights = np.polynomial.legendre.leggauss(count)
-        at = ((np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * span).ravel()
-        _, values = basis.compute_basis(self._spline.knots, at)
-        share = np.tile(0.5 * span * weights, n_spans)
-        return at, np.column_stack([values[:, 0], share])
+    def _make_points(self) -> None:
+        """Places contact points at most a radius apart, or evenly in each span, both ends included.
+
+        They lie at fixed rest arc lengths, with the trapezoid rule's weights.
+        """
+        spline = self._spline
+        n_spans = spline.n_control_points - basis.DEGREE
+        if self.law.points_per_span is None:
+            count = int(np.ceil(spline.length / self._spec.outer_radius))
+        else:
+            count = n_spans * self.law.points_per_span
+        count = max(count, n_spans)
+        at = np.linspace(0.0, spline.length, count + 1)
+        spans, values = basis.compute_basis(spline.knots, at)
+        share = np.full(count + 1, spline.length / count)
+        share[[0, -1]] *= 0.5
+        self.arc_lengths = at
+        self._points = np.column_stack([values[:, 0], share])
+        self._first = np.searchsorted(spans, np.arange(n_spans + 1))
+        self._memory = np.zeros((count + 1, contact_law.SLOTS, 4))
+        self._slides = np.zeros((count + 1, contact_law.SLOTS, 5))
+        self._pairs = np.zeros((2 * (count + 1) + _SPARE, 15))
+        self._block, self._found = np.zeros((10, 6)), np.zeros(4)
+        self._room = np.zeros((count + 1 + n_spans, 4))
 
     def _make_row(self, obstacle: Obstacle) -> Array:
         order, row = self.order, np.zeros(shapes.ROW)

@@ -12,6 +12,7 @@ from hose_mj.errors import StepError
 from hose_mj.hoses.geds import energy, frames, integrators, mechanics, newton, records
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.contact import add_contact
+from hose_mj.hoses.geds.contact_law import Motion
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.twist import accept_twist
@@ -99,7 +100,7 @@ class Dynamics:
         rows, work = self.constraints.rows, self.make_work()
         length = self.hose.tables.span_length * len(self.hose.tables.first)
         tolerance = _STATIC_TOLERANCE * length
-        limits = records.Limits(tolerance, length, _STATIC_ITERATIONS, _STATIC_TURN, False, 1.0)
+        limits = records.Limits(tolerance, length, _STATIC_ITERATIONS, _STATIC_TURN, False, 1.0, np.inf)
         verdict, found = records.NOT_CONVERGED, self.state.x
         changing = (rows.twist.accepted, rows.twist.spin, rows.before, rows.after)
         before = [part.copy() for part in changing]
@@ -180,10 +181,8 @@ class Dynamics:
         )
         newton.add_moments(self.axes, loads, True, x, work)
         # Within a step without end nothing changes its velocity, but what slides still rubs.
-        add_contact(
-            *(self.axes, loads.contact, x, work.rate, work.rate, _ENDLESS, True),
-            *(work.gradient, work.band),
-        )
+        motion = Motion(work.rate, x, _ENDLESS, 0.0)
+        add_contact(self.axes, loads.contact, x, motion, True, work.gradient, work.band)
         return work
 
     def linearize(self) -> Linearization:

@@ -62,8 +62,9 @@ class GedsHose(SplineBody):
             (docs/frenet.md): theta is then the angle from the Frenet normal, a clamp holds that
             angle, and `reset` sets theta = 0, so that the hose is twisted by its curve's torsion.
         scheme: "bdf2" (default), "backward-euler", "sdirk2", "midpoint" or "verlet".
-        tolerance: Newton goes on while it moves a control point by more than this fraction of L;
-            with 1e-3 and steps of 5 ms a swinging rod gains energy, with the default it does not.
+        tolerance: Newton goes on while it moves a control point by more than this fraction of L.
+        force_tolerance: Newton goes on while it leaves more than this fraction of the force scale:
+            loads, inertia and what holds the hose, in sum. It is what stiff, slack hoses need.
         max_iterations: Newton iterations in a stage before the careful fallback.
         obstacles: what the hose may touch; `set_obstacles` changes it.
         contact_law: numbers of the contact; None for the defaults.
@@ -88,12 +89,14 @@ class GedsHose(SplineBody):
         twist: str | None = None,
         scheme: str = "bdf2",
         tolerance: float = 2e-4,
+        force_tolerance: float = 5e-3,
         max_iterations: int = 20,
         obstacles: Sequence[Obstacle] = (),
         contact_law: ContactLaw | None = None,
     ) -> None:
         check_number("timestep", timestep)
         check_number("tolerance", tolerance)
+        check_number("force_tolerance", force_tolerance)
         check_count("max_iterations", max_iterations, 1)
         has_theta = mechanics.check_twist(twist, spec, plane)
         mechanics.check_scheme(scheme, spec, has_theta)
@@ -102,8 +105,10 @@ class GedsHose(SplineBody):
         self.scheme = scheme
         move = tolerance * spec.length
         turn_length = move / _TURN_TOLERANCE
-        limits = records.Limits(move, turn_length, max_iterations, np.inf, False, 0.0)
-        self.contacts = ContactSet(spline, spec, self.gravity, float(timestep), self._state, scheme)
+        limits = records.Limits(
+            move, turn_length, max_iterations, np.inf, False, 0.0, force_tolerance
+        )
+        self.contacts = ContactSet(spline, spec, move, float(timestep), self._state, scheme)
         self._loads = LoadSet(spline, self._weight, self.contacts)
         self._counts = np.zeros(3, dtype=np.int64)
         self._dynamics = Dynamics(
@@ -340,6 +345,7 @@ class GedsHose(SplineBody):
             valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
             raise InputError("holds of a closed loop", "none", valid)
         self._dynamics.solve_static(int(load_steps))
+        self.contacts.forget()
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and constraint rows in the control points' n d coordinates."""
@@ -386,5 +392,6 @@ class GedsHose(SplineBody):
     def _start(self, director: Array | None = None) -> None:
         self._counts[STEPS] = 0
         self.contacts.set_closed(False)
+        self.contacts.forget()
         self._loads.clear()
         self._constraints.clear(director)

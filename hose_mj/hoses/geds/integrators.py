@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
+from hose_mj.hoses.geds.contact import accept_contact
+from hose_mj.hoses.geds.contact_law import IMPACTS
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.kkt import multiply_row, solve_with_constraints
 from hose_mj.hoses.geds.newton import add_mass, build, newton
@@ -135,6 +137,7 @@ def _try_step(axes, hose, constraints, loads, limits, scheme, dt, parts, state, 
     """
     size = len(state.x)
     for k in range(size):
+        work.start[k] = state.x[k]
         work.x_now[k] = state.x[k]
         work.v_now[k] = state.v[k]
     n_stages = 2 if scheme == _SDIRK2 else 1
@@ -209,7 +212,13 @@ def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, wo
     """One step; where its Newton fails, backward Euler, in the end in ever finer parts."""
     # A line search takes more, shorter steps: three times as many may be needed.
     careful = Limits(
-        limits.tolerance, limits.turn_length, 3 * limits.max_iterations, np.inf, True, 0.0
+        limits.tolerance,
+        limits.turn_length,
+        3 * limits.max_iterations,
+        np.inf,
+        True,
+        0.0,
+        limits.force_tolerance,
     )
     verdict = NOT_FINITE
     for attempt in range(ATTEMPTS):
@@ -332,8 +341,12 @@ def _take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts):
 
 
 @merged
-def end_step(axes, hose, constraints, state, p):
+def end_step(axes, hose, constraints, contact, state, p):
     """Accepts a step: constraints stand where they came to, twist and frames are what was found."""
+    if contact.geoms.shape[0] + contact.given.shape[0] > 0:
+        accept_contact(axes, contact, state)
+        if contact.found[IMPACTS] > 0.0:
+            state.started[0] = 0.0
     response = constraints.response
     for row in range(len(constraints.start)):
         constraints.before[row] = constraints.after[row]
@@ -357,7 +370,7 @@ def advance(axes, hose, constraints, loads, limits, scheme, dt, n_steps, state, 
         verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        end_step(axes, hose, constraints, state, work.span)
+        end_step(axes, hose, constraints, loads.contact, state, work.span)
     return DONE
 
 
@@ -370,7 +383,7 @@ def advance_verlet(axes, hose, constraints, loads, limits, scheme, dt, n_steps, 
         verdict = _take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        end_step(axes, hose, constraints, state, work.span)
+        end_step(axes, hose, constraints, loads.contact, state, work.span)
     return DONE
 
 
@@ -393,7 +406,7 @@ def try_step(axes, hose, constraints, loads, limits, scheme, dt, state, trial, c
 
 
 @compiled
-def accept_step(axes, hose, constraints, trial, state):
+def accept_step(axes, hose, constraints, loads, trial, state):
     """Makes a step of `try_step` count."""
     copy_state(trial, state)
-    end_step(axes, hose, constraints, state, make_span())
+    end_step(axes, hose, constraints, loads.contact, state, make_span())

@@ -75,7 +75,8 @@ def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> record
     mass = basis.make_mass(knots, average_density(spec, quarters))
     # Of a solid round section about its axis.
     gyration = 0.5 * spec.outer_radius**2
-    return records.Hose(tables, elasticity, mass, gyration, float(spec.drag / spec.linear_density))
+    drag_rate = float(spec.drag / spec.linear_density)
+    return records.Hose(tables, elasticity, mass, gyration, drag_rate, float(spec.linear_density))
 
 
 def make_cells(weights: Array, n_spans: int, length: float) -> Array:

@@ -14,12 +14,13 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.hoses.geds.band import factorize, factorize_indefinite
-from hose_mj.hoses.geds.contact import add_contact, add_self_contact
-from hose_mj.hoses.geds.contact_law import TOLERANCE
+from hose_mj.hoses.geds.contact import add_contact, measure_contact_left
+from hose_mj.hoses.geds.contact_law import STAGE, TIMESTEP, TOUCHED, Motion
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
 from hose_mj.hoses.geds.kkt import add_constraint_weight, multiply_row, solve_with_constraints
 from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE
+from hose_mj.hoses.geds.self_contact import add_self_contact
 from hose_mj.hoses.geds.span import LEAST_A
 from hose_mj.hoses.geds.twist import predict_twist
 from hose_mj.jit import choose_by_unknowns, inlined, merged
@@ -31,6 +32,12 @@ _STEEP = 0.5
 its start; a lesser rise Newton's next step mends."""
 _LEAST_FACTOR, _MOST_FACTOR = 0.1, 0.7
 """Of one shortening: the secant's root, kept from creeping and from giving up the step at once."""
+
+_STUCK = 10.0
+"""A residual that is within so many times the tolerance after the last iteration, where points go
+on between sticking and sliding, ends a stage all the same, as a fallback."""
+_ROUNDING = 1e-9
+"""Of EA: forces below it are not told from rounding, which is 1e-16 EA over a span's share of L."""
 
 
 @inlined
@@ -112,8 +119,7 @@ def add_moments(axes, loads, exact, x, work):
 def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     """Fills work.gradient with the residual without constraints, work.band with its derivative.
 
-    The twist's rank-one terms are not in the band: `solve_with_constraints` adds them. Returns how
-    many contact points touch something.
+    The twist's rank-one terms are not in the band: `solve_with_constraints` adds them.
     """
     h, X, V = stage
     size = len(x)
@@ -146,9 +152,10 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
         add_moments(axes, loads, exact, x, work)
     contact = loads.contact
     add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
-    if contact.geoms.shape[0] + contact.given.shape[0] == 0:
-        return 0
-    return add_contact(axes, contact, x, work.rate, V, h, exact, work.gradient, work.band)
+    contact.found[TOUCHED] = 0.0
+    if contact.geoms.shape[0] + contact.given.shape[0] > 0:
+        motion = Motion(work.rate, work.start, h, progress * contact.law[TIMESTEP])
+        add_contact(axes, contact, x, motion, exact, work.gradient, work.band)
 
 
 @inlined
@@ -199,8 +206,9 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
     exact = fallbacks == 0
     factor = slope = 0.0
     softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
+    loads.contact.found[STAGE] += 1.0
     while True:
-        n_contacts = build(axes, hose, stage, twist, fraction, loads, scale, exact, x, work)
+        build(axes, hose, stage, twist, fraction, loads, scale, exact, x, work)
         # Constraints not yet met come first: the line search starts from a point that meets them.
         if limits.line_search and exact and iteration > 2 and shortened < _MOST_SHORTENINGS:
             shorter = _shorten(factor, slope, work)
@@ -226,16 +234,69 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
             if turn > limits.rotation_cap:
                 factor = limits.rotation_cap / turn
         _move(twist, factor, x, work)
-        tolerance = limits.tolerance
-        if n_contacts > 0:
-            tolerance = min(tolerance, loads.contact.law[TOLERANCE])
-        if factor == 1.0 and largest <= tolerance:
-            return DONE, iteration, fallbacks
+        if factor == 1.0 and largest <= limits.tolerance:
+            wanted = limits.force_tolerance * _measure_scale(hose, stage, constraints, loads, x, work)
+            left = _measure_strain_left(axes, hose, work.step)
+            if left <= wanted and loads.contact.found[TOUCHED] > 0.0:
+                left += _measure_contact_left(axes, stage, fraction, loads.contact, x, work)
+            if left <= wanted:
+                return DONE, iteration, fallbacks
+            if iteration == limits.max_iterations and not left > _STUCK * wanted:
+                return DONE, iteration, fallbacks + 1
         if iteration == limits.max_iterations:
             return NOT_CONVERGED, iteration, fallbacks
         iteration += 1
         exact = True
         shortened = 0
+
+
+@inlined
+def _measure_scale(hose, stage, constraints, loads, x, work):
+    """The force (N) that a residual is compared with: loads, inertia, holds.
+
+    What is left of EA keeps rounding out where there is none of these.
+    """
+    h, X, V = stage
+    force, inertia = 0.0, 0.0
+    for k in range(len(x)):
+        force += abs(loads.force[k])
+        inertia += abs((x[k] - X[k]) / h - V[k]) / h
+    force += inertia * hose.density * hose.tables.span_length
+    for row in range(len(constraints.start)):
+        # One for a row of a place, none for one of a slope.
+        share = 0.0
+        for k in range(constraints.rows.shape[1]):
+            share += constraints.rows[row, k]
+        force += abs(share * work.multipliers[row])
+    return force + _ROUNDING * hose.elasticity.axial_stiffness[0]
+
+
+@inlined
+def _measure_strain_left(axes, hose, step):
+    """The largest axial force (N) that a Newton step leaves: EA times its strain of second order."""
+    d, tables = len(axes), hose.tables
+    largest = 0.0
+    for e in range(tables.first.shape[0]):
+        square = 0.0
+        for g in range(3):
+            f0, f1 = tables.first[e, g, 0], tables.first[e, g, 1]
+            f2, f3 = tables.first[e, g, 2], tables.first[e, g, 3]
+            for c in range(len(axes[:3])):
+                k = e * d + c
+                turn = f0 * step[k] + f1 * step[k + d] + f2 * step[k + 2 * d] + f3 * step[k + 3 * d]
+                square += tables.weights[g] * turn * turn
+        largest = max(largest, 0.5 * hose.elasticity.axial_stiffness[e] * square)
+    return largest
+
+
+@inlined
+def _measure_contact_left(axes, stage, fraction, contact, x, work):
+    """What a Newton step leaves of the contact's residual, N."""
+    h, X, _ = stage
+    for k in range(len(x)):
+        work.rate[k] = (x[k] - X[k]) / h
+    motion = Motion(work.rate, work.start, h, fraction * contact.law[TIMESTEP])
+    return measure_contact_left(axes, contact, x, motion)
 
 
 @inlined

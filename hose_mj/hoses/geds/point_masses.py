@@ -140,7 +140,7 @@ def advance_with_masses(axes, hose, constraints, loads, limits, run, state, coun
         verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
         if verdict != DONE:
             return verdict
-        end_step(axes, hose, constraints, state, work.span)
+        end_step(axes, hose, constraints, contact, state, work.span)
         _move(axes, constraints, masses, first, dt)
         if len(masses.owner) > 0:
             compute_forces(axes, contact, state.x, state.v, forces, reactions)

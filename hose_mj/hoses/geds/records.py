@@ -35,6 +35,7 @@ class Hose(NamedTuple):
         mass: per coordinate, band (n, 4).
         gyration: rotational inertia about the tangent over mass (m^2), for theta.
         drag_rate: drag per mass c (1/s).
+        density: mass per rest length (kg/m).
     """
 
     tables: Tables
@@ -42,6 +43,7 @@ class Hose(NamedTuple):
     mass: Array
     gyration: float
     drag_rate: float
+    density: float
 
 
 class Response(NamedTuple):
@@ -125,6 +127,7 @@ class Limits(NamedTuple):
         constraint_weight: weight of G^T G in the matrix, relative to its mean diagonal; above 0
             where the hose alone has rigid motions (statics). The matrix may be indefinite then, as
             long as the twist's rank-one terms and the constraints make up for it.
+        force_tolerance: what a step may leave of the forces, of their scale.
     """
 
     tolerance: float
@@ -133,13 +136,14 @@ class Limits(NamedTuple):
     rotation_cap: float
     line_search: bool
     constraint_weight: float
+    force_tolerance: float
 
 
 class Work(NamedTuple):
     """Work arrays of one hose and the multipliers of its constraints.
 
     x, X and V are a stage, x_now and v_now a step in the making, flat (n d,): nothing reaches the
-    state before the step is done.
+    state before the step is done; start is where it began.
     """
 
     span: Span
@@ -158,6 +162,7 @@ class Work(NamedTuple):
     V: Array
     x_now: Array
     v_now: Array
+    start: Array
 
 
 @compiled
@@ -178,6 +183,7 @@ def make_work(n_control_points, n_dof, n_rows):
         np.zeros((n_rows, n_rows)),
         np.zeros(n_rows),
         np.zeros(padded),
+        np.zeros(size),
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),

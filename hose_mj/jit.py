@@ -187,6 +187,8 @@ def _name_cache(made: Any, suffix: str) -> None:
 class _LinkedLibrary(JITCodeLibrary):
     """Code that others link into theirs, as is: no machine code is made of it."""
 
+    is_apart = False
+
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
@@ -195,6 +197,8 @@ class _LinkedLibrary(JITCodeLibrary):
             # May be defined in many modules, and dropped where nobody calls it.
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"
+                if self.is_apart:
+                    function.add_function_attribute("noinline")
         for variable in self._shared_module.global_variables:
             if variable.name.startswith(_ENVIRONMENT):
                 names.append(variable.name)
@@ -204,15 +208,28 @@ class _LinkedLibrary(JITCodeLibrary):
         super()._finalize_final_module()  # type: ignore[no-untyped-call]
 
 
+class _ApartLibrary(_LinkedLibrary):
+    """The same for code that its callers call."""
+
+    is_apart = True
+
+
 class _LinkedCompiler(Compiler):
     """Compiles a function for compiled callers."""
 
+    library: Any = _LinkedLibrary
+
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compiles a function as numba does, but into a `_LinkedLibrary`."""
-        make: Any = _LinkedLibrary
-        self.state.library = make(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
         return super().compile_extra(func)  # type: ignore[no-untyped-call]
+
+
+class _ApartCompiler(_LinkedCompiler):
+    """The same for a function that is not to be inlined."""
+
+    library = _ApartLibrary
 
 
 def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str, Any]) -> None:
@@ -223,7 +240,7 @@ def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str
 
     @cache
     def make_inner() -> Any:
-        settings = {**_OPTIONS, **options, **_NO_PYTHON, "pipeline_class": _LinkedCompiler}
+        settings = {**_OPTIONS, "pipeline_class": _LinkedCompiler, **options, **_NO_PYTHON}
         inner = numba.njit(**settings)(function)
         _name_cache(inner, ".inner")
         return inner
@@ -238,6 +255,8 @@ compiled = _decorate()
 # For loops that must give, bit for bit, what their source gives as plain Python: no contractions.
 bitwise = _decorate(fastmath=False, **_BARE)
 kernel = _decorate(**_BARE)
+# A long function with several callers: once in each entry's code, not once in each caller.
+apart = _decorate(**_BARE, **({"pipeline_class": _ApartCompiler} if _LINKS else {}))
 # Over all cores, with the arithmetic of its source; what it calls has its own options.
 parallel = _decorate(fastmath=False, parallel=True)
 # For small functions of a record with many fields, which a call would have to copy one by one.

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import integrators
+from hose_mj.hoses.geds import stepping
 from hose_mj.hoses.geds.dynamics import Dynamics
 from hose_mj.hoses.geds.integrators import STEPS
-from hose_mj.hoses.geds.point_masses import NEAR, PointMasses, advance_with_masses
+from hose_mj.hoses.geds.point_masses import NEAR, PointMasses
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array, Hold
 
@@ -31,7 +31,6 @@ class BodyCoupling:
 
     def __init__(self, dynamics: Dynamics) -> None:
         self._dynamics = dynamics
-        self._trial = integrators.make_state(len(dynamics.state.x))
 
     def try_step(self, holds: Sequence[Hold], positions: ArrayLike, compliance: ArrayLike) -> Array:
         """Takes a step that counts only once `accept_step` is called; it may be tried again.
@@ -53,25 +52,23 @@ class BodyCoupling:
             StepError: no fallback finished the step; nothing has changed.
         """
         d = self._dynamics
-        code = self._check_implicit()
+        self._check_implicit()
         d.constraints.set_compliance(holds, positions, compliance)
-        counts = np.zeros(3, dtype=np.int64)
-        verdict = d.run(integrators.try_step, code, d.timestep, d.state, self._trial, counts)
-        counts[STEPS] = 0
-        d.counts += counts
+        steps = int(d.counts[STEPS])
+        verdict = d.run(stepping.TRY, 1)
+        d.counts[STEPS] = steps
         d.check(verdict)
         return d.constraints.compute_mean_forces()
 
     def accept_step(self) -> None:
         """Makes the step of the last `try_step` count."""
         d = self._dynamics
-        arguments = (d.axes, d.hose, d.constraints.rows, d.loads.loads, self._trial, d.state)
-        integrators.accept_step(*arguments)
+        d.run(stepping.ACCEPT, 1)
         d.counts[STEPS] += 1
 
     def compute_positions(self) -> Array:
         """Where the holds of the last `try_step` would have the hose, (k, 3), m."""
-        return self._dynamics.constraints.compute_positions(self._trial.x)
+        return self._dynamics.constraints.compute_positions(self._dynamics.trial.x)
 
     def compute_mean_forces(self) -> Array:
         """Mean forces over the last step of the holds on bodies, (k, 3), N; zero without."""
@@ -93,20 +90,17 @@ class BodyCoupling:
             StepError: as `GedsHose.step`; the steps before count.
         """
         d = self._dynamics
-        code = self._check_implicit()
+        self._check_implicit()
         check_count("n_steps", n_steps, 0)
         first = d.constraints.set_compliance(holds)
-        counts = np.zeros(3, dtype=np.int64)
-        run = (code, d.timestep, int(n_steps))
-        verdict = d.run(advance_with_masses, run, d.state, counts, masses, first)
-        d.counts += counts
+        before = int(d.counts[STEPS])
+        verdict = d.run(stepping.ADVANCE, int(n_steps), masses, first)
         if verdict != NEAR:
             d.check(verdict)
-        return int(counts[STEPS])
+        return int(d.counts[STEPS]) - before
 
-    def _check_implicit(self) -> int:
-        """Returns the scheme's number; raises `InputError` for the explicit one."""
+    def _check_implicit(self) -> None:
+        """Raises `InputError` for the explicit scheme."""
         scheme = self._dynamics.scheme
         if scheme == "verlet":
             raise InputError("scheme", scheme, "an implicit scheme for a hose on bodies")
-        return integrators.SCHEMES[scheme]

@@ -38,7 +38,7 @@ from hose_mj.hoses.geds.touch import (
     is_skipped,
     is_span_near,
 )
-from hose_mj.jit import compiled, inlined, kernel
+from hose_mj.jit import apart, compiled, inlined, kernel
 
 _IMPACT = 0.05
 """A point that newly touches faster than this (m/s) ends BDF2's memory: it would bring back the
@@ -54,7 +54,7 @@ def _find_slot(memory, q, g):
     return -1
 
 
-@kernel
+@apart
 def _compute_force(axes, contact, q, g, start, touch, motion, is_trial):
     """Force per length at a point and what makes its matrix.
 
@@ -190,7 +190,7 @@ def _keep_pair(contact, k, names, force, matrix, point):
     return k + 1
 
 
-@kernel
+@apart
 def _make_matrix(contact, touch, answer, step, exact):
     """Stiffness per length of one point as (00, 11, 22, 01, 02, 12)."""
     _, n, (bend, a), _, _ = touch

@@ -70,6 +70,8 @@ class Contact(NamedTuple):
         block: stiffness of one span's contact, for each pair of its control points, (10, 6).
         found: see `TOUCHED`, (4,).
         room: work space of self-contact, (Q + S, 4).
+        forces: of `contact.compute_forces`, (Q, 3), written.
+        reactions: of the same, (G, 6), written.
     """
 
     points: Array
@@ -85,6 +87,8 @@ class Contact(NamedTuple):
     block: Array
     found: Array
     room: Array
+    forces: Array
+    reactions: Array
 
 
 class Motion(NamedTuple):

@@ -364,6 +364,8 @@ class ContactSet:
             block=self._block,
             found=self._found,
             room=self._room,
+            forces=np.zeros((len(self._points), 3)),
+            reactions=np.zeros((len(geoms), 6)),
         )
 
     def _compute_local(self, touched: contact_law.Contact) -> tuple[Array, Array]:

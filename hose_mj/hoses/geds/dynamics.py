@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import types
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.geds import energy, frames, integrators, mechanics, newton, records
+from hose_mj.hoses.geds import (
+    energy,
+    frames,
+    integrators,
+    mechanics,
+    newton,
+    packing,
+    point_masses,
+    records,
+    stepping,
+)
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.contact_law import Motion
@@ -32,6 +42,8 @@ inextensibility."""
 _RESET_ITERATIONS = 8
 """A hose with theta resets its frames after so many iterations; with frames that have gathered
 much of the hose's own turns the iteration crawls."""
+_NO_MASSES = point_masses.make_none()
+_NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 @dataclass
@@ -47,6 +59,7 @@ class Dynamics:
         timestep: length of a step (s).
         state: what a step changes.
         counts: steps since the last reset, Newton iterations and fallbacks so far, (3,).
+        trial: the state after a step that was tried; see body_coupling.py.
     """
 
     axes: tuple[float, ...]
@@ -59,25 +72,45 @@ class Dynamics:
     state: integrators.State
     counts: np.ndarray
 
+    def __post_init__(self) -> None:
+        self.trial = integrators.make_state(len(self.state.x))
+        self._packed_of: tuple[Any, ...] = (None,) * 4
+
     @property
     def time(self) -> float:
         """Simulated time since the last reset (s)."""
         return int(self.counts[STEPS]) * self.timestep
 
-    def run(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Calls a kernel with what all integrators read and these arguments; returns its answer."""
-        return kernel(
-            *(self.axes, self.hose, self.constraints.rows, self.loads.loads, self.limits),
-            *arguments,
-        )
-
     def advance(self, n_steps: int) -> None:
         """Takes n_steps steps; raises `StepError` for one that no fallback finished."""
-        code = integrators.SCHEMES[self.scheme]
-        arguments = (code, self.timestep, n_steps, self.state, self.counts)
-        explicit = self.scheme == "verlet"
-        kernel = integrators.advance_verlet if explicit else integrators.advance
-        self.check(self.run(kernel, *arguments))
+        self.check(self.run(stepping.ADVANCE, n_steps))
+
+    def run(
+        self,
+        what: int,
+        n_steps: int,
+        masses: point_masses.PointMasses = _NO_MASSES,
+        first: np.ndarray = _NO_ROWS,
+    ) -> int:
+        """Runs the compiled entry, `stepping.advance`; returns its verdict."""
+        rows, loads = self.constraints.rows, self.loads.loads
+        parts = (rows, loads, masses, first)
+        if any(a is not b for a, b in zip(parts, self._packed_of, strict=True)):
+            self._pack(parts)
+        verdict: int = self._enter(self._packed.address, what, self._code, n_steps)
+        return verdict
+
+    def _pack(self, parts: tuple[Any, ...]) -> None:
+        """Puts all that a step reads to where compiled code finds it."""
+        rows, loads, masses, first = parts
+        session = stepping.Session(
+            *(self.axes, self.hose, rows, loads, self.limits, self.timestep, self.state),
+            *(self.trial, self.counts, masses, first, self.make_work()),
+        )
+        self._packed, self._packed_of = packing.Packed(session), parts
+        self._code = integrators.SCHEMES[self.scheme]
+        kernel = stepping.advance_verlet if self.scheme == "verlet" else stepping.advance
+        self._enter = kernel.compile((self._packed.kind, *[types.int64] * 3))
 
     def check(self, verdict: int) -> None:
         """Raises `StepError` unless a step was done."""

@@ -14,7 +14,7 @@ from hose_mj.hoses.geds.band import factorize, solve_lower, solve_upper
 from hose_mj.hoses.geds.rod import move_frame
 from hose_mj.hoses.geds.span import LEAST_SQUARE, LEAST_TURN_ROOM, compute_derivatives
 from hose_mj.hoses.geds.twist import compute_tangent, transport
-from hose_mj.jit import compiled, inlined, kernel
+from hose_mj.jit import inlined, kernel
 
 LARGEST_GATHERED = 0.01
 """Twist rate of the frames times a span's length (rad) above which they are reset.
@@ -186,7 +186,7 @@ def _find_gauss_point(tables, n_spans, place):
     return 3 * e + g
 
 
-@compiled
+@kernel
 def reset_frames(axes, hose, constraints, state, p):
     """Resets the frames to parallel transport; theta takes over what they had gathered.
 
@@ -197,7 +197,11 @@ def reset_frames(axes, hose, constraints, state, p):
     twist = constraints.twist
     n_spans = tables.first.shape[0]
     n = n_spans + 3
-    fresh = np.zeros_like(twist.frames)
+    fresh, angles = twist.fresh, twist.angles
+    band, change = twist.fit, twist.change
+    band[:, :] = 0.0
+    change[:, :] = 0.0
+    angles[0] = 0.0
     # Any director will do: what differs at the first Gauss point differs everywhere.
     for k in range(3):
         fresh[0, 6 + k] = twist.frames[0, 6 + k]
@@ -207,9 +211,6 @@ def reset_frames(axes, hose, constraints, state, p):
     for row in range(fresh.shape[0]):
         f = fresh[row]
         f[6], f[7], f[8] = _turn(f[0], f[1], f[2], f[6], f[7], f[8], offset)
-    band = np.zeros((n + 4, 8))
-    change = np.zeros((1, n + 4))
-    angles = np.zeros(3 * n_spans)
     for row in range(fresh.shape[0]):
         f = fresh[row]
         old = twist.frames[row]
@@ -235,7 +236,9 @@ def reset_frames(axes, hose, constraints, state, p):
     for j in range(n):
         state.x[4 * j + 3] += change[0, j]
         state.x_old[4 * j + 3] += change[0, j]
-    twist.frames[:] = fresh
+    for row in range(fresh.shape[0]):
+        for k in range(fresh.shape[1]):
+            twist.frames[row, k] = fresh[row, k]
 
 
 @inlined
@@ -253,7 +256,7 @@ def _add_fit(start, values, weight, wanted, band, rhs):
             band[start + j, i - j] += weight * values[i] * values[j]
 
 
-@compiled
+@kernel
 def accept_frames(axes, hose, constraints, state, p):
     """Ends a step of a hose with theta: frames are reset if they have gathered too much.
 

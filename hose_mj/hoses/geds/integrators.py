@@ -22,12 +22,10 @@ from hose_mj.hoses.geds.records import (
     DONE,
     NOT_FINITE,
     Limits,
-    make_work,
 )
-from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.twist import accept_twist, start_twist
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import choose_by_unknowns, compiled, inlined, kernel, merged
+from hose_mj.jit import choose_by_unknowns, inlined, kernel, merged
 
 SCHEMES = {"backward-euler": 0, "bdf2": 1, "sdirk2": 2, "midpoint": 3, "verlet": 4}
 _BACKWARD_EULER, _BDF2, _SDIRK2, _MIDPOINT = range(4)
@@ -316,13 +314,9 @@ def _keep_multipliers(constraints, work, counts):
         response.force[row] = force
 
 
-@kernel
+@merged
 def take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
-    """Takes one step of an implicit scheme, but for what `end_step` does; returns a verdict.
-
-    It allocates nothing, so numba counts no references to the arrays in its records: to count them
-    would cost a short hose nearly as much as the step itself.
-    """
+    """Takes one step of an implicit scheme, but for what `end_step` does; returns a verdict."""
     verdict = _step_implicit(
         axes, hose, constraints, loads, limits, scheme, dt, state, work, counts
     )
@@ -331,8 +325,8 @@ def take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, c
     return verdict
 
 
-@kernel
-def _take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts):
+@merged
+def take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts):
     """`take_step` for Verlet, apart from it: compiled only for those who use it."""
     verdict = _step_verlet(axes, hose, constraints, loads, dt, state, work)
     if verdict == DONE:
@@ -355,38 +349,6 @@ def end_step(axes, hose, constraints, contact, state, p):
     _accept_twist(axes, hose, constraints, state, p)
 
 
-@compiled
-def advance(axes, hose, constraints, loads, limits, scheme, dt, n_steps, state, counts):
-    """Advances a state by n_steps steps of dt; returns the verdict of the last step tried.
-
-    Of an implicit scheme; `advance_verlet` is for the explicit one. A step that fails leaves the
-    state at the step before it; `counts` says how many were done. Ten arguments: it is the one
-    entry to the dynamics. It makes its work arrays itself, which is quicker than handing them over
-    from Python.
-    """
-    n_rows = len(constraints.start) + len(constraints.twist.angle)
-    work = make_work(hose.mass.shape[0], len(axes), n_rows)
-    for _ in range(n_steps):
-        verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
-        if verdict != DONE:
-            return verdict
-        end_step(axes, hose, constraints, loads.contact, state, work.span)
-    return DONE
-
-
-@compiled
-def advance_verlet(axes, hose, constraints, loads, limits, scheme, dt, n_steps, state, counts):
-    """`advance` for Verlet; no iteration, so neither limits nor the scheme's number are read."""
-    n_rows = len(constraints.start) + len(constraints.twist.angle)
-    work = make_work(hose.mass.shape[0], len(axes), n_rows)
-    for _ in range(n_steps):
-        verdict = _take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts)
-        if verdict != DONE:
-            return verdict
-        end_step(axes, hose, constraints, loads.contact, state, work.span)
-    return DONE
-
-
 @kernel
 def copy_state(source, target):
     """Copies all of a state into another one."""
@@ -394,19 +356,3 @@ def copy_state(source, target):
         target.x[k], target.v[k], target.a[k] = source.x[k], source.v[k], source.a[k]
         target.x_old[k], target.v_old[k] = source.x_old[k], source.v_old[k]
     target.started[0] = source.started[0]
-
-
-@compiled
-def try_step(axes, hose, constraints, loads, limits, scheme, dt, state, trial, counts):
-    """Takes one step of a state into `trial`; returns a verdict. `accept_step` makes it count."""
-    n_rows = len(constraints.start) + len(constraints.twist.angle)
-    work = make_work(hose.mass.shape[0], len(axes), n_rows)
-    copy_state(state, trial)
-    return take_step(axes, hose, constraints, loads, limits, scheme, dt, trial, work, counts)
-
-
-@compiled
-def accept_step(axes, hose, constraints, loads, trial, state):
-    """Makes a step of `try_step` count."""
-    copy_state(trial, state)
-    end_step(axes, hose, constraints, loads.contact, state, make_span())

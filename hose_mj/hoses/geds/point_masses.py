@@ -16,12 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hose_mj.hoses.geds.contact import compute_forces
-from hose_mj.hoses.geds.integrators import end_step, take_step
-from hose_mj.hoses.geds.records import DONE, VERDICTS, make_work
-from hose_mj.hoses.geds.shapes import POSITION, VELOCITY, measure
+from hose_mj.hoses.geds.records import VERDICTS
+from hose_mj.hoses.geds.shapes import POSITION, ROW, VELOCITY, measure
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import compiled, kernel
+from hose_mj.jit import kernel
 
 NEAR = len(VERDICTS)
 """Verdict: a mass may meet something in the next step."""
@@ -59,8 +57,16 @@ class PointMasses(NamedTuple):
     push: Array
 
 
+def make_none() -> PointMasses:
+    """Returns no masses at all."""
+    rows = [np.zeros((0, 3)) for _ in range(5)]
+    walls, arm, push = np.zeros((0, ROW)), np.zeros((0, 3)), np.zeros((0, 3))
+    owner = np.zeros(0, dtype=np.int64)
+    return PointMasses(*rows, np.zeros(0), 3, np.zeros(0), walls, owner, arm, push)
+
+
 @kernel
-def _is_clear(masses, dt):
+def is_clear(masses, dt):
     """Whether no mass can meet another or a wall within the next step."""
     for i in range(len(masses.reach)):
         speed = 0.0
@@ -84,7 +90,7 @@ def _is_clear(masses, dt):
 
 
 @kernel
-def _aim(axes, constraints, masses, first, dt):
+def aim(axes, constraints, masses, first, dt):
     """Writes where the masses would be without the hose, and their compliance."""
     for i in range(len(first)):
         for c in range(len(axes[:3])):
@@ -98,7 +104,7 @@ def _aim(axes, constraints, masses, first, dt):
 
 
 @kernel
-def _move(axes, constraints, masses, first, dt):
+def move(axes, constraints, masses, first, dt):
     """Moves the masses to where the step has found them."""
     for i in range(len(first)):
         for c in range(len(axes[:3])):
@@ -110,7 +116,7 @@ def _move(axes, constraints, masses, first, dt):
 
 
 @kernel
-def _move_shapes(geoms, masses):
+def move_shapes(geoms, masses):
     """Moves the obstacles that belong to masses."""
     for g in range(len(masses.owner)):
         i = masses.owner[g]
@@ -118,37 +124,3 @@ def _move_shapes(geoms, masses):
             for c in range(3):
                 geoms[g, POSITION + c] = masses.position[i, c] + masses.arm[g, c]
                 geoms[g, VELOCITY + c] = masses.velocity[i, c]
-
-
-@compiled
-def advance_with_masses(axes, hose, constraints, loads, limits, run, state, counts, masses, first):
-    """Advances hose and masses by up to n_steps steps; returns a verdict, `NEAR` among them.
-
-    As `schemes.advance`, with `run` the scheme, dt and n_steps, and `first` the first rows of the
-    masses' constraints, (k,).
-    """
-    scheme, dt, n_steps = run
-    n_rows = len(constraints.start) + len(constraints.twist.angle)
-    work = make_work(hose.mass.shape[0], len(axes), n_rows)
-    contact = loads.contact
-    forces = np.zeros((contact.points.shape[0], 3))
-    reactions = np.zeros((contact.geoms.shape[0], 6))
-    for _ in range(n_steps):
-        if not _is_clear(masses, dt):
-            return NEAR
-        _aim(axes, constraints, masses, first, dt)
-        verdict = take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts)
-        if verdict != DONE:
-            return verdict
-        end_step(axes, hose, constraints, contact, state, work.span)
-        _move(axes, constraints, masses, first, dt)
-        if len(masses.owner) > 0:
-            compute_forces(axes, contact, state.x, state.v, forces, reactions)
-            masses.push[:, :] = 0.0
-            for g in range(len(masses.owner)):
-                i = masses.owner[g]
-                if i >= 0:
-                    for c in range(3):
-                        masses.push[i, c] += reactions[g, c]
-            _move_shapes(contact.geoms, masses)
-    return DONE

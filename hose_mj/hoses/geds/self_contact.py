@@ -25,7 +25,7 @@ from hose_mj.hoses.geds.contact_law import (
     make_push,
 )
 from hose_mj.hoses.geds.touch import evaluate
-from hose_mj.jit import inlined, kernel
+from hose_mj.jit import apart, inlined, kernel
 
 REACH = 6.0
 """Arc between parts of a hose that may touch each other, in radii."""
@@ -57,7 +57,7 @@ def _load_places(axes, contact, x):
         room[n_points + e, 3] = np.sqrt(square)
 
 
-@kernel
+@apart
 def _find_nearest(room, q, j):
     """Squared distance of contact point q from the segment from point j to j + 1; where on it."""
     square = 0.0
@@ -129,7 +129,7 @@ def add_self_contact(axes, contact, x, rate, step, gradient, band):
     return n_contacts
 
 
-@kernel
+@apart
 def _push_apart(axes, contact, pair, rate, step, gradient, band):
     """One pair: contact point q of span e and the place t on the segment from point j of f."""
     q, j, t, e, f = pair

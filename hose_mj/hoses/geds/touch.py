@@ -15,7 +15,7 @@ from hose_mj.hoses.geds.shapes import (
     is_near,
     measure,
 )
-from hose_mj.jit import kernel
+from hose_mj.jit import apart, kernel
 
 _FLAT = ((0.0, 0.0), (0.0, 0.0, 0.0))
 _FAST = 0.25
@@ -87,7 +87,7 @@ def is_skipped(contact, q, g):
     return contact.geoms[g, SKIP_FROM] <= contact.arcs[q] <= contact.geoms[g, SKIP_TO]
 
 
-@kernel
+@apart
 def find_span(axes, contact, e, x, start):
     """Middle (3,) and radius (m) of a ball about span e, how far its control points have moved.
 
@@ -138,7 +138,7 @@ def find_next(contact, q, end, gap, stretch):
     return after
 
 
-@kernel
+@apart
 def compute_gap(axes, contact, q, g, start, x, motion, is_fast):
     """Gap, normal, curvature, friction and place of contact point q against geom g.
 

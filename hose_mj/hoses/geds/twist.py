@@ -61,6 +61,8 @@ class Twist(NamedTuple):
             clamps, at the present iterate, (3 S + C, 10).
         accepted: the same at the beginning of a step.
         turn_rows: row of the holds that fixes theta at each clamp, (C,).
+        fresh, angles, fit, change: work of `frames.reset_frames`: frames, angles between old and
+            new directors (3 S,), a band (n + 4, 8) and its right-hand side (1, n + 4).
         transported: work: the tangent u, the director and the sum of item 2, (pieces, 7).
         rows: derivative of Phi by the unknowns, (K, size + padding).
     """
@@ -79,6 +81,10 @@ class Twist(NamedTuple):
     torque: Array
     frames: Array
     accepted: Array
+    fresh: Array
+    angles: Array
+    fit: Array
+    change: Array
     turn_rows: np.ndarray
     transported: Array
     rows: Array

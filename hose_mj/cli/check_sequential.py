@@ -8,11 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import tyro
-from hose_learning.mdp.sequential_realization import (
-    PROPERTIES,
-    SequentialStudy,
-    study_sequential,
-)
+from hose_learning.mdp.sequential_realization import PROPERTIES, SequentialStudy, study_sequential
 
 from hose_mj.checks import Check
 from hose_mj.cli.results import check_counts, finish

@@ -73,11 +73,7 @@ def write_mp4(
 
 
 def render_frames(
-    episode: WorldEpisode,
-    scene: Scene,
-    size: tuple[int, int],
-    fps: int,
-    camera: str | None = None,
+    episode: WorldEpisode, scene: Scene, size: tuple[int, int], fps: int, camera: str | None = None
 ) -> Iterator[NDArray[np.uint8]]:
     """Yields pictures (height, width, 3) of an episode, evenly spaced in time."""
     times = episode.samples.times

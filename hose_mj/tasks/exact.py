@@ -146,10 +146,7 @@ def discount_cycles(model: Model, discount: float) -> Floats:
 
 
 def solve(
-    model: Model,
-    rewards: npt.ArrayLike,
-    discount: npt.ArrayLike,
-    tolerance: float = 1e-12,
+    model: Model, rewards: npt.ArrayLike, discount: npt.ArrayLike, tolerance: float = 1e-12
 ) -> Floats:
     """Returns the optimal state-action values (n_states, n_actions) by value iteration.
 

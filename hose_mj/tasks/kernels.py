@@ -213,12 +213,7 @@ def project(projection: Projection, values: Integers) -> int:
 
 @compiled
 def run_random(
-    record: Any,
-    state: Integers,
-    stream: Stream,
-    n_moves: int,
-    values: Integers,
-    counts: Integers,
+    record: Any, state: Integers, stream: Stream, n_moves: int, values: Integers, counts: Integers
 ) -> None:
     """Plays random moves, agents in turn, observing before each one; for timing and tests.
 

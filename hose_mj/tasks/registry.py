@@ -87,9 +87,7 @@ TASKS: dict[str, TaskEntry] = {
         },
     ),
     "taxi": TaskEntry(
-        *_TAXI,
-        "two taxis and two passengers on Dietterich's map (B.3)",
-        {"single_agent": False},
+        *_TAXI, "two taxis and two passengers on Dietterich's map (B.3)", {"single_agent": False}
     ),
     "taxi-single-agent": TaskEntry(
         *_TAXI,

@@ -208,7 +208,4 @@ def lay_between(hose: HoseModel, span: float) -> list[Hold]:
     """Lets a hose sag between two attachments of one height."""
     curve = _sag(span / LENGTH)
     hose.reset(lambda s: LENGTH * curve(s / LENGTH))
-    return [
-        hose.attach(0.0, (0.0, 0.0, 0.0)),
-        hose.attach(hose.spec.length, (span, 0.0, 0.0)),
-    ]
+    return [hose.attach(0.0, (0.0, 0.0, 0.0)), hose.attach(hose.spec.length, (span, 0.0, 0.0))]

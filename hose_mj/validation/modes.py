@@ -90,9 +90,7 @@ def turn_about_x(small: Linearization, angle: float) -> Linearization:
     turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
     whole = np.kron(np.eye(len(small.mass) // 3), turn)
     return Linearization(
-        whole @ small.mass @ whole.T,
-        whole @ small.stiffness @ whole.T,
-        small.constraints @ whole.T,
+        whole @ small.mass @ whole.T, whole @ small.stiffness @ whole.T, small.constraints @ whole.T
     )
 
 

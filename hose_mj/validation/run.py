@@ -12,13 +12,7 @@ import numpy as np
 from hose_mj.errors import StepError
 from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.validation.case import STIFFENING, Case, Motion, Reference
-from hose_mj.validation.settings import (
-    MOST_UNSTABLE,
-    STAGNATION,
-    Grid,
-    Setting,
-    list_static,
-)
+from hose_mj.validation.settings import MOST_UNSTABLE, STAGNATION, Grid, Setting, list_static
 
 LOST = 0.5
 """A chain's error above this fraction counts as unstable even where no number overflowed, but in
@@ -198,11 +192,7 @@ def stiffen(case: Case) -> Case:
 
 
 def run_ladder(
-    case: Case,
-    ladder: list[Setting],
-    reference: Reference,
-    grid: Grid,
-    until: float = math.inf,
+    case: Case, ladder: list[Setting], reference: Reference, grid: Grid, until: float = math.inf
 ) -> tuple[list[RunResult], list[Skipped]]:
     """Runs one model and resolution down its time steps, from the largest stable one on.
 

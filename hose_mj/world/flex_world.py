@@ -40,12 +40,7 @@ class FlexWorld(MujocoWorld):
     _advice = "try a smaller timestep, or more substeps"
 
     def __init__(
-        self,
-        scene: Scene,
-        *,
-        timestep: float | None = None,
-        segments: int = 40,
-        substeps: int = 1,
+        self, scene: Scene, *, timestep: float | None = None, segments: int = 40, substeps: int = 1
     ) -> None:
         check_count("segments", segments, 2)
         places = (*(robot.arc_length for robot in scene.robots), 0.0)

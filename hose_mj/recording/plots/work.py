@@ -238,10 +238,7 @@ def _draw_gap(axes: Axes, gap: Gap, look: Look) -> tuple[Annotation, Annotation]
 
 
 def _choose_labels(
-    axes: Axes,
-    fronts: Sequence[Sequence[WorkPoint]],
-    looks: Mapping[str, Look],
-    spacing: float,
+    axes: Axes, fronts: Sequence[Sequence[WorkPoint]], looks: Mapping[str, Look], spacing: float
 ) -> list[Label]:
     """Labels of front points: first those that reach a level most cheaply, then some others.
 

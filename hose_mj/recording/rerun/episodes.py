@@ -19,12 +19,7 @@ from hose_mj.recording.grid import GridEpisode
 from hose_mj.recording.rerun.parts import APPLICATION_ID, is_listening, open_stream, wait_until
 from hose_mj.recording.rerun.viewer import open_window
 from hose_mj.recording.rerun.world_log import WorldLog
-from hose_mj.recording.rerun.world_scene import (
-    Look,
-    log_scene,
-    log_settings,
-    make_world_blueprint,
-)
+from hose_mj.recording.rerun.world_scene import Look, log_scene, log_settings, make_world_blueprint
 from hose_mj.recording.scene_description import SceneDescription
 from hose_mj.recording.sinks import Background, Sink
 from hose_mj.recording.world_episode import EpisodeEnding, Samples, WorldEpisode

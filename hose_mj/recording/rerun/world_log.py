@@ -151,8 +151,7 @@ class WorldLog:
         places, forces = samples.rows["attachments"], samples.rows["forces"]
         k, n = places.shape[:2]
         columns = rr.Arrows3D.columns(
-            vectors=scale_forces(self.scene, forces).reshape(-1, 3),
-            origins=places.reshape(-1, 3),
+            vectors=scale_forces(self.scene, forces).reshape(-1, 3), origins=places.reshape(-1, 3)
         )
         path = path_of(self.scene, "forces")
         self.stream.send_columns(path, index, columns.partition([n] * k))

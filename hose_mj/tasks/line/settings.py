@@ -20,11 +20,7 @@ from hose_mj.tasks.variables import Variable
 
 Cell = tuple[int, int]
 
-COLLISIONS = {
-    "entering": rules.ENTERING,
-    "sweeping": rules.SWEEPING,
-    "robots": rules.ROBOTS,
-}
+COLLISIONS = {"entering": rules.ENTERING, "sweeping": rules.SWEEPING, "robots": rules.ROBOTS}
 GOAL_MODES = {"random": rules.RANDOM, "none": rules.ABSENT}
 VIOLATIONS = ("out", "stretch", "collision")
 N_DISTANCES, N_SQUARES = 24, 256

@@ -73,11 +73,7 @@ _SOME_SPIN = 1e-3
 GRID = Grid(
     static={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40), "flex": (10, 20, 40)},
     dynamic={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40, 80), "flex": (10, 20, 40, 80)},
-    schemes={
-        "geds": ("bdf2", "bdf2, planar"),
-        "cable": ("euler", "rk4"),
-        "flex": ("discrete",),
-    },
+    schemes={"geds": ("bdf2", "bdf2, planar"), "cable": ("euler", "rk4"), "flex": ("discrete",)},
     smallest_geds_step=5e-4,
     longest_ladder=4,
     longest_flex_ladder=4,

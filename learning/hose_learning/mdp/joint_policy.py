@@ -82,11 +82,7 @@ class Composition:
 
 
 def compose(
-    start: State,
-    estimates: Sequence[Estimates],
-    evaluate: Evaluate,
-    discount: float,
-    idle: int,
+    start: State, estimates: Sequence[Estimates], evaluate: Evaluate, discount: float, idle: int
 ) -> Composition:
     """Lets the agents agree on a joint move from s_0, agent 0's turn, one after the other.
 

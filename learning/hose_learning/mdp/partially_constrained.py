@@ -317,9 +317,7 @@ def write_pair(
     written_source = explicit_mdp.write_out(source, [project_state(source, target, start)], limit)
     written_target = explicit_mdp.write_out(target, [start], limit)
     return WrittenPair(
-        written_source,
-        written_target,
-        _project_all(source, target, written_source, written_target),
+        written_source, written_target, _project_all(source, target, written_source, written_target)
     )
 
 

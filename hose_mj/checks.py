@@ -1,7 +1,5 @@
 """`Check`: a measured number against its limit, as commands print it and reports show it."""
 
-from __future__ import annotations
-
 import math
 import operator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Errors a user can act on: each names the thing, the value received and the valid set."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Self
 

@@ -7,8 +7,6 @@ A kernel that serves hoses in a plane and in space takes `axes`, a tuple of two 
 length is part of its type, so one source compiles into one specialised version for each.
 """
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import importlib.util

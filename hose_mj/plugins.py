@@ -9,8 +9,6 @@ Groups: `hose_mj.hoses`, `hose_mj.tasks`, `hose_mj.scenes`, `hose_mj.cases`,
 `hose_learning.learners`. Registries ask for plug-ins only after their own names, which so win.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection
 from importlib.metadata import EntryPoint, entry_points

@@ -6,8 +6,6 @@ the centre line. The chords miss it by their sagitta, a quarter of a piece's len
 its curvature over 8.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

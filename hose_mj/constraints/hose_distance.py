@@ -7,8 +7,6 @@ two of them it is left out again when even the straight way between them could n
 Newton's method on f', falling back to halving where f' jumps.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hose_mj.hoses.geds.shapes import measure

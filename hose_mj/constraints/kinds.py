@@ -4,8 +4,6 @@ A new kind is a row of `KINDS` here, with a number for it, and a kernel that wri
 margin_kernels.py. Monitors, breaks, recordings and policies read the rest from the row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
 from typing import NamedTuple

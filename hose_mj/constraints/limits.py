@@ -1,7 +1,5 @@
 """`Limits`: the numbers that a world's margins are measured against."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from hose_mj.errors import InputError

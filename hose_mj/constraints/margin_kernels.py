@@ -5,8 +5,6 @@ everywhere the `Tables`: margins of a kind begin at `t.starts[KIND]` and end at
 `t.starts[KIND + 1]`, and things may come as near as `t.clearances[KIND]`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

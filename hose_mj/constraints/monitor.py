@@ -1,7 +1,5 @@
 """`Monitor`: the signed margins of a world, and the breaks as they happen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise

@@ -4,8 +4,6 @@ The type of a task's record selects the function that makes its `Picture` (`draw
 needs beyond that is loaded at the first frame.
 """
 
-from __future__ import annotations
-
 import functools
 import sys
 from collections.abc import Sequence

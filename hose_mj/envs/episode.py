@@ -1,7 +1,5 @@
 """`Episode`: a task being played, one move or one round at a time; what all interfaces stand on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from typing import Any

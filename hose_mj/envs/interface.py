@@ -1,7 +1,5 @@
 """The shared part of the interfaces: the task made, the episode played, the agents by name."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 The first argument of each function is the task's kernel record, as in `hose_mj.tasks.kernels`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """`JointEnv`: a task as a PettingZoo Parallel environment: all agents choose, then all move."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

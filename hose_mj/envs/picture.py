@@ -3,8 +3,6 @@
 Coordinates are cells: x to the right, y upwards, the centre of a cell at whole numbers.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 from math import ceil, dist, floor

@@ -4,8 +4,6 @@ An environment that shows itself in Rerun in a way of its own has a method `reco
 returns a `Source`; those of tasks on grids are known here.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """`VectorTaskEnv`: many copies of a task, stepped by one compiled call over all cores."""
 
-from __future__ import annotations
-
 import functools
 import os
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ The top level of each has `command`, `version`, `revision`, `machine`, `seed` an
 `checks` in a command that checks something; and the command's own results beside them.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -3,8 +3,6 @@
 Nothing here reads or writes a file. Arrays are copied, made float64 and locked on construction.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """An episode on a grid, in memory: what stands where at each turn, rewards, events; see `rerun`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which recordings of a run stay: the last few, the best, the first success, the first breaks."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass

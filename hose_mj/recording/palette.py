@@ -5,8 +5,6 @@ on white paper as well as on the viewer's dark ground. A model that is not liste
 plug-in, has a spare colour.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

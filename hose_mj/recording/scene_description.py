@@ -3,8 +3,6 @@
 Plain data in the world frame, SI units. Quaternions are w, x, y, z.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Plain data, whatever simulated it; nothing here reads or writes a file. World fr
 Samples are rows of one structured array: appending copies numbers and makes no objects.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -6,8 +6,6 @@ from hose_mj.rollout.dm_world import load
 viewer.launch(load("floor_2"))
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -9,8 +9,6 @@ it is one of MuJoCo's, which takes far longer, they are tried on a spline hose i
 and what does there as wanted is then tried on the world itself: not all carries over.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@
 the likeliest first, from a scene's geometry.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import permutations

@@ -1,7 +1,5 @@
 """A hose in MuJoCo's own pictures, coloured by tension: in a viewer, or an episode as a film."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

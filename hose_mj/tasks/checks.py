@@ -1,7 +1,5 @@
 """Checks of task options: each raises one `InputError` that names option, value and valid set."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

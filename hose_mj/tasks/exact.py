@@ -1,7 +1,5 @@
 """Small tasks written out state by state and solved by value iteration: the truth for tests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product

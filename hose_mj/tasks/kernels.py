@@ -20,8 +20,6 @@ Every record has these fields:
 - `reward_table`: reward of each set of events, by signal (2^n_events, n_signals).
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol, cast

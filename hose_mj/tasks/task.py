@@ -1,7 +1,5 @@
 """`Task`: a grid or physics task as data, with the record that selects its compiled functions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product

@@ -1,7 +1,5 @@
 """Named state variables, and projections onto some of them: what a module of a learner sees."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

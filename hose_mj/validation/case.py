@@ -1,7 +1,5 @@
 """What a case is, the hoses that cases use, how they are laid and read."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence

@@ -5,8 +5,6 @@ A case is `static` (an equilibrium, frequencies or a critical load, compared wit
 from another package, by an entry point in the group `hose_mj.cases`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

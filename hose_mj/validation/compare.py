@@ -1,7 +1,5 @@
 """The comparison: cases by models by settings, then equal-error ratios and checks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 

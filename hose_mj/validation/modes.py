@@ -1,7 +1,5 @@
 """Small motions of any hose model: frequencies and critical loads from `HoseModel.linearize`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

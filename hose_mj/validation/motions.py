@@ -1,7 +1,5 @@
 """The dynamic cases, compared with their converged limit, and those with contact."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache, partial

@@ -4,8 +4,6 @@ Each function returns checks; together they are the part of `hose-mj compare` th
 One more measures the softness that is left in the edges of MuJoCo's flex rod.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping

@@ -11,8 +11,6 @@ rate-independent plasticity; Mielke and Theil 2004). No spline, no time, no velo
 nothing with the hose models but the Cholesky factorization. delta is a small part of the increment.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

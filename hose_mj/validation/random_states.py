@@ -1,7 +1,5 @@
 """Random states and loads, wilder than any use: what the solver does with them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

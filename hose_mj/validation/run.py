@@ -1,7 +1,5 @@
 """Runs cases: statics in one go, motions down ladders of time steps, timed in rounds."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

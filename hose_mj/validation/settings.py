@@ -1,7 +1,5 @@
 """The grid of settings on which `hose-mj compare` looks for each model's cheapest."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

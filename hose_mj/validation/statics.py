@@ -1,7 +1,5 @@
 """The static cases: equilibria, frequencies, critical loads and twists with a closed form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial

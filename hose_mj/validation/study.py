@@ -1,7 +1,5 @@
 """Gathers what `hose-mj compare` runs: the cases, and GEDS's own numerics; or a user's hose."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field

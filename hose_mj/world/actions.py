@@ -5,8 +5,6 @@ and in z for robots that are driven there. On the shipped floors these are the c
 task, so a state of the world is one of the line task (chapter 7).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

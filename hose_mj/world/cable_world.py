@@ -1,7 +1,5 @@
 """`CableWorld`: MuJoCo's composite cable among the bodies of a scene."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

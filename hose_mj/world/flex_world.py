@@ -1,7 +1,5 @@
 """`FlexWorld`: MuJoCo's 1-D flex among the bodies of a scene."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -5,8 +5,6 @@ which both meet at the attachments, and goes on until they do. Hose and bodies e
 same impulses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

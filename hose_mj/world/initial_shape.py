@@ -1,7 +1,5 @@
 """How a hose lies when a scene starts: at rest between its attachments, round what is there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -7,8 +7,6 @@ Planes have a bit of their own: of a capsule they touch the two ends, so spheres
 the same contacts, each of them once.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ cable_world.py and flex_world.py say what the hose is made of. MuJoCo solves bod
 between them and all contacts in one step.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any

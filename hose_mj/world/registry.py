@@ -1,7 +1,5 @@
 """Worlds by the name of the hose's model."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from typing import Any

@@ -6,8 +6,6 @@ the same shape (initial_shape.py) and answer the same questions. Frame: the worl
 length 0 is at the source, L at the tip.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any
 from warnings import warn

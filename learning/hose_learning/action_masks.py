@@ -4,8 +4,6 @@
 `action_masks()`, which sb3-contrib's MaskablePPO asks for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 

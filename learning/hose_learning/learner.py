@@ -1,7 +1,5 @@
 """Makes a learner's records from its settings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -7,8 +7,6 @@ other. Both stop after a number of moves or episodes, when the log is full, or w
 to be; calling them again goes on exactly where they stopped.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from hose_learning import records, rules

@@ -5,8 +5,6 @@ with a threshold it also vetoes what lies below it (Definition 4). A *veto* modu
 actions led to certain events in what it sees, and vetoes them from then on (section 5.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -1,7 +1,5 @@
 """How an action is chosen among those that are allowed, given as bits of one integer."""
 
-from __future__ import annotations
-
 import math
 
 from hose_mj.jit import jitable

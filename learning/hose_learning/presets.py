@@ -1,7 +1,5 @@
 """Ready modules for the tasks of the thesis: what its chapters let goal and veto modules see."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

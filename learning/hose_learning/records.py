@@ -3,8 +3,6 @@
 `hose_learning.learner.make_learner` makes both from settings.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ of every logged pair (s, a). What remains is what a veto module has to see: the 
 tell apart, the sooner it knows them all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

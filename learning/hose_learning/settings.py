@@ -1,7 +1,5 @@
 """All settings of a learner as data: what a run is identified by."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -5,8 +5,6 @@ addressing with linear probing; what was never written reads as zeros. `grow` do
 loops stop before it is full and leave that to their caller.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -9,8 +9,6 @@ A table's row is copied to the rows of all those states. What was never written 
 the source and in the target alike, so only written rows have to be copied, in hashed tables too.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Bars with intervals beside the values that others found, a panel for each data set."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Plots of curves: convergence with orders, numbers over time, learning."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

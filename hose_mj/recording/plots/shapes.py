@@ -1,7 +1,5 @@
 """Plots of shapes, to scale: snapshots of a motion, and fans of equilibria."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Errors against closed forms: one panel per model, one line per parameter, over the resolution."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

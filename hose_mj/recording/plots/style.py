@@ -1,7 +1,5 @@
 """One look for every plot: figures, axes, units, levels, slopes, notes, checked input."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 Arrows say how much more a peer costs at equal error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

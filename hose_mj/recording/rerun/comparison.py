@@ -1,7 +1,5 @@
 """A comparison of hose models as a Rerun recording: one tab per scene, the models overlaid."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings of episodes, whole ones in worlds and on grids, and sinks for those that go on."""
 
-from __future__ import annotations
-
 import time
 import uuid
 from collections.abc import Sequence

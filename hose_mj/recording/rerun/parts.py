@@ -1,7 +1,5 @@
 """Pieces that all recordings share: stream, layout, plain entities, texts, waiting."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Reads Rerun recordings back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

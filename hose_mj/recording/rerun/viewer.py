@@ -1,7 +1,5 @@
 """Rerun's viewer, on this machine only: in a window, or without one for pictures, always ended."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

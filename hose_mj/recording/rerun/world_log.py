@@ -1,7 +1,5 @@
 """The samples of an episode in a world as Rerun entities; the paths stand in the package."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs what of an episode in a world stands still, and lays out what the viewer shows of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The tables [[holds]] of a user's file: where the hose is held, how holds move and turn."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

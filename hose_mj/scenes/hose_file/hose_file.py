@@ -3,8 +3,6 @@
 docs/own_hose.md lists every key with its unit; assets/hoses/ has examples.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The table [hose] of a user's file: what the hose is made of."""
 
-from __future__ import annotations
-
 from hose_mj.errors import InputError
 from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_catalogue
 from hose_mj.hoses.spec import Fitting, HoseSpec, complete_section

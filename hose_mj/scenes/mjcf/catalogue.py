@@ -8,8 +8,6 @@ one of these, or a module that lies in such a folder:
     yard = "my_package.scenes"
 """
 
-from __future__ import annotations
-
 import os
 from importlib.metadata import EntryPoint
 from pathlib import Path

@@ -5,8 +5,6 @@ formed UTF-8 without document type or entities, bounded in size, elements and de
 attribute that names a file or a folder leads to a file below the scene's own folder.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from dataclasses import dataclass, field

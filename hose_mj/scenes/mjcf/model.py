@@ -6,8 +6,6 @@ compiled numbers and take one step (`inspect_scene`); what comes back is a recor
 or one `InputError`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -5,8 +5,6 @@ The conventions (docs/scenes.md): sites `hose_source` and `goal`; robots are bod
 by `<custom>` numerics and a named material. All else is plain MJCF that MuJoCo opens as it is.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import warnings

@@ -4,8 +4,6 @@ Points 0 .. N - 1 are the robots, tip first, and point N is the source; segment 
 j and j + 1, so robot i ends the segments i - 1 and i.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The line-segment hose task (thesis B.2): settings, and the task made from them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

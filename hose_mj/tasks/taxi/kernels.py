@@ -1,7 +1,5 @@
 """The multi-agent taxi problem (thesis B.3), compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from hose_mj.jit import inlined, jitable

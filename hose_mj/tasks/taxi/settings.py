@@ -1,7 +1,5 @@
 """The multi-agent taxi problem (thesis B.3): map, settings, and the task made from them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from itertools import product

@@ -1,7 +1,5 @@
 """The corridor of Example 1 (thesis section 6.4) and the maze of Table 5.1, compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from hose_mj.jit import inlined, jitable

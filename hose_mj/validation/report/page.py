@@ -4,8 +4,6 @@ The page says what was measured in the order a physicist asks for it; the words 
 measurement stand in texts.md.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

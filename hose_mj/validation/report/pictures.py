@@ -1,7 +1,5 @@
 """Pictures and scenes of `hose-mj compare`: what is drawn of which case, with which words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """What a user's hose asked for: how fine each model must be, and how far its best run stays."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

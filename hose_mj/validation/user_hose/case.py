@@ -1,7 +1,5 @@
 """A user's hose as a case of `hose-mj compare`, and the smooth line along which it is laid."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Runs a user's hose within a budget: how far the models disagree, how fine each must be."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence

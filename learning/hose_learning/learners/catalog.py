@@ -12,8 +12,6 @@ does in `hose_learning.rules`, with functions that are `hose_mj.jit.jitable`, as
 folder do. The command line trains it, and the contract tests hold it to what all learners do.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 from collections.abc import Mapping

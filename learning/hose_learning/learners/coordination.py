@@ -4,8 +4,6 @@ Each edge {i, j} has values Q_ij(s, a_i, a_j) of its own for each module; their 
 stands for the team's Q(s, a). An edge sees what the first of its two agents sees.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from hose_learning.learners import solvers

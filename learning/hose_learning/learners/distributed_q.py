@@ -4,8 +4,6 @@ Each agent knows its own actions alone and takes the best that ever followed one
 follows it: its teammates will find their part. Values only rise, so there is no learning rate.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Each agent learns alone, from a weighted mean of its own reward and those of its
 the hose.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator

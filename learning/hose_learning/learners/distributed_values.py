@@ -4,8 +4,6 @@ Each agent learns from its own reward and a weighted mean of what it and its nei
 hose expect from then on; so rewards reach all agents, the later the farther they are away.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator

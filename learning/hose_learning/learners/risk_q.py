@@ -6,8 +6,6 @@ xi Q(s, a) - Q_risk(s, a); xi is 0 until the risk has settled, then it rises for
 stays below a bound omega.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ All solvers work on a `Graph` and a `Scratch`, whose `values` begin with the pay
 `maximize` is compiled for itself, so that it is found on disk by every learner and task.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -4,8 +4,6 @@ The team is one learner that sees what all agents see and chooses for all of the
 game's joint actions, which is exact and grows exponentially with the number of agents.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ As in Algorithm 6.3 each agent learns from whole cycles, but only from good surp
 its last moves too, each the less the longer ago it was.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

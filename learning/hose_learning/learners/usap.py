@@ -5,8 +5,6 @@ agent's classifier, which is fitted anew every so often; from then on an action 
 undesired with probability 1/2 or more is not taken.
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal, NamedTuple
 
 import numpy as np

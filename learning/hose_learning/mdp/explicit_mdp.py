@@ -1,7 +1,5 @@
 """Decision processes written out with their terminal states, as chapter 7 speaks of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ playing in turns. For a joint move the agents pass a message around once: the st
 so far may have brought about, each with its probability. All of it is plain Python on dicts.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

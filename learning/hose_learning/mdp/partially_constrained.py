@@ -1,7 +1,5 @@
 """Partially constrained models (thesis chapter 7): Definition 11 and what follows from it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal

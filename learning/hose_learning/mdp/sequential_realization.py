@@ -4,8 +4,6 @@ A cooperative game in turns realizes a game of joint moves if a joint action a_i
 agent but the i-th is idle, does what agent i's action a_i does alone (Definition 10).
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Attributes of the classifiers: what the agent saw and did, as numbers in [0, 1] (section 8.2)."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The twelve classifiers of Tables 8.1 and 8.2 by id, each with what stands for it here."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

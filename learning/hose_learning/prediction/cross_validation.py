@@ -1,7 +1,5 @@
 """Repeated stratified cross-validation of two-class classifiers (section 8.3.1)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

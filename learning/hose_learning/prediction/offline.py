@@ -1,7 +1,5 @@
 """The experiment of section 8.3.1: all classifiers on random logs, beside the thesis's tables."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What `hose-mj classifiers` prints and writes: tables, log, records and a plot."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

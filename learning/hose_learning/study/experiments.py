@@ -1,7 +1,5 @@
 """The thesis's experiments as data, and what each has to show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 What a job gives depends on nothing but the job, so the order of the workers does not matter.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

@@ -5,8 +5,6 @@
 and the checkpoint last of all, so a run that is killed goes on from its last checkpoint.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import io

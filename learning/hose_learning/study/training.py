@@ -1,7 +1,5 @@
 """`Training`: a learner on a task, trained for as long as one likes, tested and saved."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal

@@ -20,20 +20,14 @@ _COMPARISONS = {
 class Check:
     """A measured number against its limit.
 
-    Attributes:
-        name: what was measured.
-        value: the number measured; one that is not finite never passes.
-        limit: the bound it is held against.
-        comparison: how value and limit must stand: ``<=``, ``<``, ``>=``, ``>`` or ``==``.
-
     Raises:
         InputError: an unknown comparison or a limit that is not finite.
     """
 
-    name: str
-    value: float
-    limit: float
-    comparison: str = "<="
+    name: str  # what was measured
+    value: float  # the number measured; one that is not finite never passes
+    limit: float  # the bound it is held against
+    comparison: str = "<="  # how value and limit must stand: `<=`, `<`, `>=`, `>` or `==`
 
     def __post_init__(self) -> None:
         if self.comparison not in _COMPARISONS:

@@ -8,36 +8,24 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Renamed:
-    """What became of an option; its old spelling works on for one release.
+    """What became of an option; its old spelling works on for one release."""
 
-    Attributes:
-        new: how it is called now; None if it had no effect and is gone.
-        prefix: goes before each of its values.
-        several: words that the option took; if there are some, it is only with several of these
-            that it has another name now.
-    """
-
-    new: str | None
-    prefix: str = ""
+    new: str | None  # how it is called now; None if it had no effect and is gone
+    prefix: str = ""  # goes before each of its values
+    # Words that the option took; if there are some, it is only with several of these that it has
+    # another name now.
     several: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Command:
-    """A sub-command.
+    """A sub-command."""
 
-    Attributes:
-        module: has `Args`, a frozen dataclass whose docstrings are the help, and `run(args)`.
-        summary: its line in `hose-mj --help`.
-        examples: command lines that its own help ends with.
-        needs: extras without which it can do nothing, see `hose_mj.extras`.
-        renamed: its options that were called otherwise.
-    """
-
-    module: str
-    summary: str
-    examples: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
+    module: str  # has `Args`, a frozen dataclass whose docstrings are the help, and `run(args)`
+    summary: str  # its line in `hose-mj --help`
+    examples: tuple[str, ...] = ()  # command lines that its own help ends with
+    needs: tuple[str, ...] = ()  # extras without which it can do nothing, see `hose_mj.extras`
+    # Its options that were called otherwise.
     renamed: Mapping[str, Renamed] = field(default_factory=dict)
 
 

@@ -73,19 +73,12 @@ class Args:
 
 @dataclass(frozen=True)
 class Rollout:
-    """One episode as the document and the terminal show it.
+    """One episode as the document and the terminal show it."""
 
-    Attributes:
-        world: in which it was.
-        outcome: how it ended.
-        wall_s: of planning and the episode (s).
-        overhead: time that recording took over that of the rest, see `_Timed`.
-    """
-
-    world: World
-    outcome: EpisodeResult
-    wall_s: float
-    overhead: float
+    world: World  # in which it was
+    outcome: EpisodeResult  # how it ended
+    wall_s: float  # of planning and the episode (s)
+    overhead: float  # time that recording took over that of the rest, see `_Timed`
 
     def to_record(self, args: Args) -> dict[str, Any]:
         """The document's fields."""

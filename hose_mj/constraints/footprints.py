@@ -34,17 +34,11 @@ CHORDS = 4
 
 @dataclass(frozen=True)
 class Footprint:
-    """What of a robot must not meet hose, robots and obstacles.
+    """What of a robot must not meet hose, robots and obstacles."""
 
-    Attributes:
-        geoms: numbers of its colliding geoms; all of its geoms where none collides.
-        radius: of an upright cylinder around them, about the middle of their bounding box (m).
-        upright: whether it is a single cylinder whose axis is and stays vertical: a puck.
-    """
-
-    geoms: NDArray[np.int64]
-    radius: float
-    upright: bool
+    geoms: NDArray[np.int64]  # numbers of its colliding geoms; all of its geoms where none collides
+    radius: float  # of an upright cylinder around them, about the middle of their bounding box (m)
+    upright: bool  # whether it is a single cylinder whose axis is and stays vertical: a puck
 
 
 def make_footprint(world: World, robot: int) -> Footprint:

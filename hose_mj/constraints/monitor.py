@@ -27,26 +27,18 @@ _INSIDE = 1e-9
 
 @dataclass(frozen=True)
 class Break:
-    """A margin that fell below zero.
+    """A margin that fell below zero."""
 
-    Attributes:
-        kind: name of one of `KINDS`.
-        robot: the robot's number; None for a stretched segment.
-        other: the segment (stretch, run-over), the other robot (collision), the obstacle's geom
-            (obstacle); None for bounds.
-        time: when the margin was zero (s).
-        place: where (3,), m, world frame.
-        margin: at the end of the step in which it was crossed, m, or N for stretch.
-        speed: how fast the margin fell in that step, m/s, or N/s for stretch; 0 for a margin that
-            was below zero from the start.
-    """
-
-    kind: str
-    robot: int | None
+    kind: str  # name of one of `KINDS`
+    robot: int | None  # the robot's number; None for a stretched segment
+    # The segment (stretch, run-over), the other robot (collision), the obstacle's geom (obstacle);
+    # None for bounds.
     other: int | str | None
-    time: float
-    place: tuple[float, float, float]
-    margin: float
+    time: float  # when the margin was zero (s)
+    place: tuple[float, float, float]  # where (3,), m, world frame
+    margin: float  # at the end of the step in which it was crossed, m, or N for stretch
+    # How fast the margin fell in that step, m/s, or N/s for stretch; 0 for a margin that was below
+    # zero from the start.
     speed: float
 
     def describe(self) -> str:

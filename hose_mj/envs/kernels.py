@@ -19,46 +19,27 @@ Flags = npt.NDArray[np.int8]
 
 
 class Sight(NamedTuple):
-    """Which variables are seen, and through whose eyes.
+    """Which variables are seen, and through whose eyes."""
 
-    Attributes:
-        agents: the agent that sees each entry, rising (n_seen,).
-        columns: its place among the task's variables (n_seen,).
-    """
-
-    agents: Integers
-    columns: Integers
+    agents: Integers  # the agent that sees each entry, rising (n_seen,)
+    columns: Integers  # its place among the task's variables (n_seen,)
 
 
 class Batch(NamedTuple):
-    """Many copies of a task and what happened to them, all written in place.
+    """Many copies of a task and what happened to them, all written in place."""
 
-    Attributes:
-        states: (n, state_size).
-        streams: random numbers of each copy (n, 1).
-        over: 1 where the episode has ended, so that the next step starts a new one (n,).
-        caused_events: the events that each agent caused (n, n_agents).
-        reward_by_mover: reward of each mover's events, for each agent, by signal
-            (n, n_agents, n_agents, n_signals).
-        values: work arrays of observed values (n, n_variables).
-        seen: the chosen values (n, n_seen).
-        allowed: 1 where an action is available (n, n_agents, n_actions).
-        events: all events of the step (n,).
-        terminated: 1 where an event ended the episode (n,).
-        truncated: 1 where the step limit did (n,).
-    """
-
-    states: Integers
-    streams: Stream
-    over: Flags
-    caused_events: Integers
+    states: Integers  # (n, state_size)
+    streams: Stream  # random numbers of each copy (n, 1)
+    over: Flags  # 1 where the episode has ended, so that the next step starts a new one (n,)
+    caused_events: Integers  # the events that each agent caused (n, n_agents)
+    # Reward of each mover's events, for each agent, by signal (n, n_agents, n_agents, n_signals).
     reward_by_mover: Floats
-    values: Integers
-    seen: Integers
-    allowed: Flags
-    events: Integers
-    terminated: Flags
-    truncated: Flags
+    values: Integers  # work arrays of observed values (n, n_variables)
+    seen: Integers  # the chosen values (n, n_seen)
+    allowed: Flags  # 1 where an action is available (n, n_agents, n_actions)
+    events: Integers  # all events of the step (n,)
+    terminated: Flags  # 1 where an event ended the episode (n,)
+    truncated: Flags  # 1 where the step limit did (n,)
 
 
 @jitable

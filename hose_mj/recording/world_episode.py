@@ -47,19 +47,13 @@ def make_row_type(scene: SceneDescription) -> np.dtype[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A stretch of an episode, k samples.
+    """A stretch of an episode, k samples."""
 
-    Attributes:
-        rows: see `make_row_type`, (k,), times rising, numbers finite but for the margins.
-        owners: whose turn it was, "" for nobody's, (k,).
-        vetoed: the actions vetoed, in one text, "" for none, (k,).
-        events: what happened, in one text, "" for nothing, (k,).
-    """
-
+    # See `make_row_type`, (k,), times rising, numbers finite but for the margins.
     rows: NDArray[Any]
-    owners: tuple[str, ...]
-    vetoed: tuple[str, ...]
-    events: tuple[str, ...]
+    owners: tuple[str, ...]  # whose turn it was, "" for nobody's, (k,)
+    vetoed: tuple[str, ...]  # the actions vetoed, in one text, "" for none, (k,)
+    events: tuple[str, ...]  # what happened, in one text, "" for nothing, (k,)
 
     def __post_init__(self) -> None:
         check_rising("times of the samples", self.rows["time"])
@@ -90,20 +84,13 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class BreakMark:
-    """A broken constraint: which, where and when.
+    """A broken constraint: which, where and when."""
 
-    Attributes:
-        kind: "stretch", "collision", ...
-        time: s.
-        place: (3,), m.
-        text: one line for the reader.
-        record: all that is known of it, plain JSON values.
-    """
-
-    kind: str
-    time: float
-    place: Array
-    text: str
+    kind: str  # "stretch", "collision", ...
+    time: float  # s
+    place: Array  # (3,), m
+    text: str  # one line for the reader
+    # All that is known of it, plain JSON values.
     record: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

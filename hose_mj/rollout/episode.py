@@ -18,13 +18,9 @@ SAMPLE_RATE = 25.0
 
 
 class Policy(Protocol):
-    """What chooses the motors' controls.
+    """What chooses the motors' controls."""
 
-    Attributes:
-        ends_at_goal: whether the episode is over when the tip is at the goal.
-    """
-
-    ends_at_goal: bool
+    ends_at_goal: bool  # whether the episode is over when the tip is at the goal
 
     def start(self, world: World, monitor: Monitor, generator: np.random.Generator) -> None:
         """Called once, at the state in which the episode starts."""

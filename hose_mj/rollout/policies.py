@@ -133,19 +133,12 @@ class FreeCells:
 
 @dataclass(frozen=True)
 class GoalPlan:
-    """How the tip is brought to the goal.
+    """How the tip is brought to the goal."""
 
-    Attributes:
-        rise: cells by which robots that can rise do so first; a hose that hangs low catches.
-        avoid: whether the tip avoids the hose; where it is all around, there is no such way.
-        pace: how fast, as a share of what the robots can.
-        slack: share of a segment that two neighbours may be apart.
-    """
-
-    rise: int
-    avoid: bool
-    pace: float
-    slack: float
+    rise: int  # cells by which robots that can rise do so first; a hose that hangs low catches
+    avoid: bool  # whether the tip avoids the hose; where it is all around, there is no such way
+    pace: float  # how fast, as a share of what the robots can
+    slack: float  # share of a segment that two neighbours may be apart
 
     def make_script(self, driver: Driver) -> Script | None:
         """The tip goes to the goal by the shortest free way; the others follow its trail.

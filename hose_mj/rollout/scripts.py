@@ -23,16 +23,11 @@ class Script:
 
     Between two formations all robots move straight and arrive together, so two that are near enough
     for their hose in both formations are so in between (a distance is a convex function).
-
-    Attributes:
-        robot: the one it is about.
-        formations: (k, N, 3), m.
-        pace: how fast it is played, as a share of what the robots can.
     """
 
-    robot: int
-    formations: Array
-    pace: float = 1.0
+    robot: int  # the one it is about
+    formations: Array  # (k, N, 3), m
+    pace: float = 1.0  # how fast it is played, as a share of what the robots can
 
 
 def move(world: World, robot: int, *changes: dict[int, Array]) -> Script:

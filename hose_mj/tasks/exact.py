@@ -18,19 +18,12 @@ OVER = -1
 
 @dataclass(frozen=True)
 class Model:
-    """A task written out. The step limit plays no part in it.
+    """A task written out. The step limit plays no part in it."""
 
-    Attributes:
-        states: the states that can be reached, step count 0 (n_states, state_size).
-        successors: index of the next state, or `OVER` (n_states, n_actions).
-        events: events of each move (n_states, n_actions).
-        rewards: what each agent gets, all signals added up (n_states, n_actions, n_agents).
-    """
-
-    states: Integers
-    successors: Integers
-    events: Integers
-    rewards: Floats
+    states: Integers  # the states that can be reached, step count 0 (n_states, state_size)
+    successors: Integers  # index of the next state, or `OVER` (n_states, n_actions)
+    events: Integers  # events of each move (n_states, n_actions)
+    rewards: Floats  # what each agent gets, all signals added up (n_states, n_actions, n_agents)
 
     @property
     def turns(self) -> Integers:

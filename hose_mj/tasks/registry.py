@@ -31,25 +31,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TaskEntry:
-    """Where a task is and what it is.
+    """Where a task is and what it is."""
 
-    Attributes:
-        module: module with the settings class and the factory, which takes the settings.
-        settings: name of the settings class.
-        factory: name of the factory.
-        description: one line for listings.
-        presets: settings that make the id; they cannot be given.
-        defaults: settings that differ from the class's defaults; they can.
-        is_alone: whether the task has one agent whatever its settings.
-    """
-
-    module: str
-    settings: str
-    factory: str
-    description: str
+    module: str  # module with the settings class and the factory, which takes the settings
+    settings: str  # name of the settings class
+    factory: str  # name of the factory
+    description: str  # one line for listings
+    # Settings that make the id; they cannot be given.
     presets: Mapping[str, Any] = field(default_factory=dict)
+    # Settings that differ from the class's defaults; they can.
     defaults: Mapping[str, Any] = field(default_factory=dict)
-    is_alone: bool = False
+    is_alone: bool = False  # whether the task has one agent whatever its settings
 
 
 _LINE = ("hose_mj.tasks.line.settings", "LineSettings", "make_line")

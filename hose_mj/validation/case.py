@@ -43,16 +43,11 @@ UNIT_FREQUENCY = math.sqrt(BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**4))
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a dynamic case.
+    """The motion of a dynamic case."""
 
-    Attributes:
-        duration: s.
-        n_samples: instants, evenly spaced and the last at the end, at which models are compared.
-        drive: moves the holds for the end of a step at time t; None where nothing is moved.
-    """
-
-    duration: float
-    n_samples: int
+    duration: float  # s
+    n_samples: int  # instants, evenly spaced and the last at the end, at which models are compared
+    # Moves the holds for the end of a step at time t; None where nothing is moved.
     drive: Callable[[HoseModel, list[Hold], float], None] | None = None
 
     @property

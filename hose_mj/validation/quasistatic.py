@@ -27,22 +27,15 @@ _ITERATIONS = 200
 
 
 class Chain(NamedTuple):
-    """A chain on a rough floor.
+    """A chain on a rough floor."""
 
-    Attributes:
-        h: rest length of a link (m).
-        stretch, bend: EA (N) and EI (N m^2).
-        drag: friction per length (N/m).
-        delta: slip below which friction is smoothed (m).
-        tolerance: largest change of a coordinate in a converged Newton step (m).
-    """
-
-    h: float
+    h: float  # rest length of a link (m)
+    # stretch, bend: EA (N) and EI (N m^2).
     stretch: float
     bend: float
-    drag: float
-    delta: float
-    tolerance: float
+    drag: float  # friction per length (N/m)
+    delta: float  # slip below which friction is smoothed (m)
+    tolerance: float  # largest change of a coordinate in a converged Newton step (m)
 
 
 @kernel

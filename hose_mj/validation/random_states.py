@@ -17,17 +17,11 @@ N_STEPS = 3
 
 @dataclass
 class Tally:
-    """Counts of the ways in which random states ended.
+    """Counts of the ways in which random states ended."""
 
-    Attributes:
-        not_finite: a position or velocity that is not finite.
-        verdicts: a StepError.
-        touched: a StepError after which the state was not the one before the failing step.
-    """
-
-    not_finite: int = 0
-    verdicts: int = 0
-    touched: int = 0
+    not_finite: int = 0  # a position or velocity that is not finite
+    verdicts: int = 0  # a StepError
+    touched: int = 0  # a StepError after which the state was not the one before the failing step
 
 
 def make_random_hose(rng: np.random.Generator) -> GedsHose:

@@ -29,31 +29,20 @@ N_DRAWN, N_DRAWN_IN_SPACE = 41, 601
 
 @dataclass
 class RunResult:
-    """The result of one setting in one case.
+    """The result of one setting in one case."""
 
-    Attributes:
-        case: its id.
-        setting: how it was run.
-        error: largest error as a fraction (of the reference value or of the hose's length).
-        reference: "closed form" or "converged".
-        wall_s: least wall time of the whole run, moving of holds included, reading excluded (s).
-        sim_s: simulated time (s); None in statics.
-        fallbacks: of the solver.
-        times: sampled instants (k,).
-        points: centre lines at those instants, (k, N_DRAWN or N_DRAWN_IN_SPACE, 3).
-        values: the probe at those instants, (k, q).
-    """
-
-    case: str
-    setting: Setting
-    error: float
-    reference: str
+    case: str  # its id
+    setting: Setting  # how it was run
+    error: float  # largest error as a fraction (of the reference value or of the hose's length)
+    reference: str  # "closed form" or "converged"
+    # Least wall time of the whole run, moving of holds included, reading excluded (s).
     wall_s: float
-    sim_s: float | None
-    fallbacks: int
-    times: Array = field(repr=False)
+    sim_s: float | None  # simulated time (s); None in statics
+    fallbacks: int  # of the solver
+    times: Array = field(repr=False)  # sampled instants (k,)
+    # Centre lines at those instants, (k, N_DRAWN or N_DRAWN_IN_SPACE, 3).
     points: Array = field(repr=False)
-    values: Array = field(repr=False)
+    values: Array = field(repr=False)  # the probe at those instants, (k, q)
 
     @property
     def wall_s_per_sim_s(self) -> float | None:

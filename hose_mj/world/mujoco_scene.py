@@ -110,22 +110,15 @@ _TORSION, _ROLLING = 0.005, 0.0001
 
 @dataclass(frozen=True)
 class HoseContact:
-    """How the hose touches things.
+    """How the hose touches things."""
 
-    Attributes:
-        friction: MuJoCo's five coefficients, of which the first two, Coulomb's, count.
-        priority: above that of all geoms of the scene: in a contact with the hose its friction and
-            hardness count.
-        solref: critically damped, two of the world's time steps.
-        bits: contype of each piece of the hose (N,), for all but planes.
-        plane_bit: contype for planes.
-    """
-
-    friction: list[float]
+    friction: list[float]  # MuJoCo's five coefficients, of which the first two, Coulomb's, count
+    # Above that of all geoms of the scene: in a contact with the hose its friction and hardness
+    # count.
     priority: int
-    solref: list[float]
-    bits: np.ndarray
-    plane_bit: int
+    solref: list[float]  # critically damped, two of the world's time steps
+    bits: np.ndarray  # contype of each piece of the hose (N,), for all but planes
+    plane_bit: int  # contype for planes
 
     def write(self, item: mujoco.MjsGeom | mujoco.MjsFlex, bits: int) -> None:
         """Lets a geom or flex of the hose touch what takes on these bits."""

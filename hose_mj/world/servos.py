@@ -43,23 +43,16 @@ _MOTOR = {
 
 @dataclass(frozen=True)
 class Motors:
-    """The motors of one robot.
+    """The motors of one robot."""
 
-    Attributes:
-        robot: its number.
-        ids: of the actuators (k,).
-        gains: force of a control of 1 (k,), N or N m.
-        low, high: the controls allowed (k,); infinite where there is no limit.
-        chain: the degrees of freedom between the world and the robot's site (c,).
-        in_chain: which of the motors pull at these (k,); the others turn wheels or the like.
-    """
-
-    robot: int
-    ids: Indices
-    gains: Array
+    robot: int  # its number
+    ids: Indices  # of the actuators (k,)
+    gains: Array  # force of a control of 1 (k,), N or N m
+    # low, high: the controls allowed (k,); infinite where there is no limit.
     low: Array
     high: Array
-    chain: Indices
+    chain: Indices  # the degrees of freedom between the world and the robot's site (c,)
+    # Which of the motors pull at these (k,); the others turn wheels or the like.
     in_chain: npt.NDArray[np.bool_]
 
     def choose(self, which: npt.NDArray[np.bool_]) -> Motors:

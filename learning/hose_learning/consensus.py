@@ -28,35 +28,25 @@ IDLE = -1
 class ConsensusSettings:
     """A network of clocks.
 
-    Attributes:
-        n_agents: N.
-        loss: probability that a message is lost, each on its own.
-        delay: largest delay of a message, in rounds; each has a uniform one of 0 .. delay.
-        drift: largest relative error of a clock's rate; each has a uniform one of +- drift.
-        rounds: rounds of messages in one turn.
-        offset: the first clocks are uniform between 0 and this many turns.
-        first_turn: turns before this one are left to the clocks to agree; nobody acts in them.
-        n_turns: turns that are played.
-        action_time: longest action, in turns; durations are uniform from 0 on.
-        early_finish: whether an agent that is done gives the turn at once, xi_i <- t_i + 1, or lets
-            it run out.
-        falls_back: whether the mean with others' clocks may take a clock back below a turn that it
-            has reached, as the thesis has it; see `simulate`.
-
     Raises:
         InputError: a value outside its range.
     """
 
-    n_agents: int = 4
-    loss: float = 0.1
-    delay: int = 1
+    n_agents: int = 4  # N
+    loss: float = 0.1  # probability that a message is lost, each on its own
+    delay: int = 1  # largest delay of a message, in rounds; each has a uniform one of 0 .. delay
+    # Largest relative error of a clock's rate; each has a uniform one of +- drift.
     drift: float = 0.02
-    rounds: int = 50
-    offset: float = 3.0
+    rounds: int = 50  # rounds of messages in one turn
+    offset: float = 3.0  # the first clocks are uniform between 0 and this many turns
+    # Turns before this one are left to the clocks to agree; nobody acts in them.
     first_turn: int = 6
-    n_turns: int = 60
-    action_time: float = 0.5
+    n_turns: int = 60  # turns that are played
+    action_time: float = 0.5  # longest action, in turns; durations are uniform from 0 on
+    # Whether an agent that is done gives the turn at once, xi_i <- t_i + 1, or lets it run out.
     early_finish: bool = True
+    # Whether the mean with others' clocks may take a clock back below a turn that it has reached,
+    # as the thesis has it; see `simulate`.
     falls_back: bool = False
 
     def __post_init__(self) -> None:

@@ -24,29 +24,21 @@ Credit = Literal["cycle", "own"]
 class Module:
     """What one module sees and learns from.
 
-    Attributes:
-        name: for messages and listings.
-        variables: names of the task's variables; none at all is a single state.
-        kind: "value" or "veto".
-        signals: reward signals that a value module adds up.
-        events: events that a veto module answers to.
-        credit: who learns from a reward or an event: everyone who acted within the "cycle", or
-            the mover for its "own" action alone.
-        threshold: a value module vetoes actions whose values lie below it; None vetoes nothing.
-        actions: the actions that a veto module is about; by default all of them.
-
     Raises:
         InputError: an unknown kind or credit.
     """
 
-    name: str
-    variables: tuple[str, ...]
-    kind: Kind = "value"
-    signals: tuple[str, ...] = ()
-    events: tuple[str, ...] = ()
+    name: str  # for messages and listings
+    variables: tuple[str, ...]  # names of the task's variables; none at all is a single state
+    kind: Kind = "value"  # "value" or "veto"
+    signals: tuple[str, ...] = ()  # reward signals that a value module adds up
+    events: tuple[str, ...] = ()  # events that a veto module answers to
+    # Who learns from a reward or an event: everyone who acted within the "cycle", or the mover for
+    # its "own" action alone.
     credit: Credit = "cycle"
+    # A value module vetoes actions whose values lie below it; None vetoes nothing.
     threshold: float | None = None
-    actions: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()  # the actions that a veto module is about; by default all of them
 
     def __post_init__(self) -> None:
         for name, choices in (("kind", get_args(Kind)), ("credit", get_args(Credit))):

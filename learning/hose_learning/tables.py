@@ -24,18 +24,13 @@ _FREE = 0
 
 
 class Table(NamedTuple):
-    """Rows by key.
+    """Rows by key."""
 
-    Attributes:
-        keys: key + 1 of each slot, 0 where it is free (capacity,), a power of two; none at all in a
-            dense table, whose keys are its rows.
-        used: number of slots taken (1,).
-        rows: the rows (capacity + 1, width); the last one is zero and stands for all absent keys.
-    """
-
+    # Key + 1 of each slot, 0 where it is free (capacity,), a power of two; none at all in a dense
+    # table, whose keys are its rows.
     keys: Integers
-    used: Integers
-    rows: Any
+    used: Integers  # number of slots taken (1,)
+    rows: Any  # the rows (capacity + 1, width); the last one is zero and stands for all absent keys
 
 
 def make_table(size: int, width: int, dtype: npt.DTypeLike, hashed: bool | None = None) -> Table:

@@ -34,21 +34,14 @@ LARGEST = 2**24
 
 @dataclass(frozen=True)
 class Image:
-    """Where the keys of one module of the source lie in that of the target.
+    """Where the keys of one module of the source lie in that of the target."""
 
-    Attributes:
-        strides: of each source variable in the source's key (k,).
-        cardinalities: of these variables (k,).
-        images: what a step of each adds to the target's key (k,).
-        offsets: what each combination of the variables that only the target sees adds to it (n,).
-        size: number of the source's keys.
-    """
-
-    strides: Integers
-    cardinalities: Integers
-    images: Integers
+    strides: Integers  # of each source variable in the source's key (k,)
+    cardinalities: Integers  # of these variables (k,)
+    images: Integers  # what a step of each adds to the target's key (k,)
+    # What each combination of the variables that only the target sees adds to it (n,).
     offsets: Integers
-    size: int
+    size: int  # number of the source's keys
 
     def map(self, keys: Integers) -> Integers:
         """Returns all keys of the target that are projected onto each of the source's (n_keys, n).
@@ -242,27 +235,19 @@ class TransferPlan:
 
 @dataclass(frozen=True)
 class TransferOutcome:
-    """What came of one configuration.
+    """What came of one configuration."""
 
-    Attributes:
-        modules: names of the modules transferred.
-        reached: whether each greedy episode on the target reached its goal.
-        moves: of single agents in these episodes.
-        source_reached: whether the greedy policy reaches the goal on the source itself.
-        controls: for each exchange rate the moves explored, and whether they reached the goal.
-        vetoes_before, vetoes_after: vetoed actions in the target's tables, before and after its
-            episodes.
-        vetoes_lost: those of before that are not there after.
-    """
-
-    modules: tuple[str, ...]
-    reached: tuple[bool, ...]
-    moves: int
-    source_reached: bool
+    modules: tuple[str, ...]  # names of the modules transferred
+    reached: tuple[bool, ...]  # whether each greedy episode on the target reached its goal
+    moves: int  # of single agents in these episodes
+    source_reached: bool  # whether the greedy policy reaches the goal on the source itself
+    # For each exchange rate the moves explored, and whether they reached the goal.
     controls: tuple[tuple[int, bool], ...]
+    # vetoes_before, vetoes_after: vetoed actions in the target's tables, before and after its
+    # episodes.
     vetoes_before: int
     vetoes_after: int
-    vetoes_lost: int
+    vetoes_lost: int  # those of before that are not there after
 
 
 def run_trial(plan: TransferPlan, generator: np.random.Generator) -> TransferOutcome:

@@ -46,23 +46,15 @@ class Args:
 
 @dataclass(frozen=True)
 class Record:
-    """One measured number.
+    """One measured number."""
 
-    Attributes:
-        group: the group it belongs to.
-        name: what was measured; unique in its group.
-        value: the number.
-        unit: its unit.
-        peer: what it is compared with, the name of another record; None without one.
-        ratio: how many times faster than the peer; None without one.
-    """
-
-    group: str
-    name: str
-    value: float
-    unit: str
+    group: str  # the group it belongs to
+    name: str  # what was measured; unique in its group
+    value: float  # the number
+    unit: str  # its unit
+    # What it is compared with, the name of another record; None without one.
     peer: str | None = None
-    ratio: float | None = None
+    ratio: float | None = None  # how many times faster than the peer; None without one
 
 
 @dataclass

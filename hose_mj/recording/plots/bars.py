@@ -29,33 +29,21 @@ FILLED = 0.8
 
 @dataclass(frozen=True)
 class Bar:
-    """A share between 0 and 1.
+    """A share between 0 and 1."""
 
-    Attributes:
-        value: its length; NaN for no bar.
-        interval: half width of its interval; NaN for none.
-        reference: what others found; None for nothing.
-        sure: whether the reference can be right as printed; its mark is hollow if not.
-    """
-
-    value: float
-    interval: float = math.nan
-    reference: float | None = None
-    sure: bool = True
+    value: float  # its length; NaN for no bar
+    interval: float = math.nan  # half width of its interval; NaN for none
+    reference: float | None = None  # what others found; None for nothing
+    sure: bool = True  # whether the reference can be right as printed; its mark is hollow if not
 
 
 @dataclass(frozen=True)
 class BarPanel:
-    """One data set.
+    """One data set."""
 
-    Attributes:
-        title: above its axes.
-        series: label to one bar for each item.
-        guide: a share to draw a line at, with its name; None for no line.
-    """
-
-    title: str
-    series: Mapping[str, Sequence[Bar]]
+    title: str  # above its axes
+    series: Mapping[str, Sequence[Bar]]  # label to one bar for each item
+    # A share to draw a line at, with its name; None for no line.
     guide: tuple[float, str] | None = None
 
 

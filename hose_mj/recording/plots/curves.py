@@ -142,33 +142,22 @@ PANEL = (4.6, 3.5)
 
 @dataclass(frozen=True)
 class Curve:
-    """One line; values that are not finite are left out.
+    """One line; values that are not finite are left out."""
 
-    Attributes:
-        x: (k,).
-        middle: (k,).
-        low, high: its band (k,).
-    """
-
-    x: ArrayLike
-    middle: ArrayLike
+    x: ArrayLike  # (k,)
+    middle: ArrayLike  # (k,)
+    # low, high: its band (k,).
     low: ArrayLike
     high: ArrayLike
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One measure of all learners.
+    """One measure of all learners."""
 
-    Attributes:
-        name: of the measure, with its unit.
-        curves: by label; the same labels in all panels.
-        scale: "share" from 0 to 1, "log" or "linear".
-    """
-
-    name: str
-    curves: Mapping[str, Curve]
-    scale: Literal["share", "log", "linear"] = "linear"
+    name: str  # of the measure, with its unit
+    curves: Mapping[str, Curve]  # by label; the same labels in all panels
+    scale: Literal["share", "log", "linear"] = "linear"  # "share" from 0 to 1, "log" or "linear"
 
 
 def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:

@@ -49,20 +49,13 @@ _SHIFT = 6.0
 
 @dataclass(frozen=True)
 class WorkPoint:
-    """One setting of one model with its cost.
+    """One setting of one model with its cost."""
 
-    Attributes:
-        model: model id, or "geds planar"; points of one model make a series.
-        label: the setting, short ("16, 1 ms").
-        error: as a fraction.
-        wall_s_per_sim_s: wall over simulated time.
-        clamp_corrected: True or False for a model whose clamp needs correcting, else None.
-    """
-
-    model: str
-    label: str
-    error: float
-    wall_s_per_sim_s: float
+    model: str  # model id, or "geds planar"; points of one model make a series
+    label: str  # the setting, short ("16, 1 ms")
+    error: float  # as a fraction
+    wall_s_per_sim_s: float  # wall over simulated time
+    # True or False for a model whose clamp needs correcting, else None.
     clamp_corrected: bool | None = None
 
     @property
@@ -73,16 +66,11 @@ class WorkPoint:
 
 @dataclass(frozen=True)
 class Gap:
-    """An arrow that says what a peer costs more at equal error.
+    """An arrow that says what a peer costs more at equal error."""
 
-    Attributes:
-        at_error: the level, as a fraction.
-        against: model id of the peer.
-        cost, cost_against: wall over simulated time of the two.
-    """
-
-    at_error: float
-    against: str
+    at_error: float  # the level, as a fraction
+    against: str  # model id of the peer
+    # cost, cost_against: wall over simulated time of the two.
     cost: float
     cost_against: float
 

@@ -36,29 +36,19 @@ _FLAT = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Framing:
-    """A view of a scene, in world coordinates (m).
+    """A view of a scene, in world coordinates (m)."""
 
-    Attributes:
-        eye, target, up: the camera, (3,) each.
-        size: largest extent of the scene.
-        half_height: of what the eye sees at the target's distance.
-        grid_normal: of the grid's plane, a unit axis (3,).
-        grid_distance: of the grid's plane from the origin, along the normal.
-        grid_spacing: 1, 2 or 5 times a power of ten, about a tenth of the size.
-        corner: upper left of the scene as seen from the eye, where the legend begins.
-        is_planar: whether the scene is flat, and seen straight on.
-    """
-
+    # eye, target, up: the camera, (3,) each.
     eye: Array
     target: Array
     up: Array
-    size: float
-    half_height: float
-    grid_normal: Array
-    grid_distance: float
-    grid_spacing: float
-    corner: Array
-    is_planar: bool
+    size: float  # largest extent of the scene
+    half_height: float  # of what the eye sees at the target's distance
+    grid_normal: Array  # of the grid's plane, a unit axis (3,)
+    grid_distance: float  # of the grid's plane from the origin, along the normal
+    grid_spacing: float  # 1, 2 or 5 times a power of ten, about a tenth of the size
+    corner: Array  # upper left of the scene as seen from the eye, where the legend begins
+    is_planar: bool  # whether the scene is flat, and seen straight on
 
     @property
     def eye_up(self) -> Array:

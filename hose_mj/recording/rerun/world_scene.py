@@ -40,13 +40,9 @@ _LOOKS = {True: (0.25, -0.8, 0.95), False: (0.45, -1.0, 0.5)}
 
 @dataclass(frozen=True)
 class Look:
-    """The look that tells one of several overlaid episodes apart.
+    """The look that tells one of several overlaid episodes apart."""
 
-    Attributes:
-        rank: 0 for the first, in the scene's own colours; the others are tinted and see-through.
-    """
-
-    rank: int
+    rank: int  # 0 for the first, in the scene's own colours; the others are tinted and see-through
 
     @property
     def color(self) -> Rgb:

@@ -62,23 +62,15 @@ class Spin(Timed):
 
 @dataclass(frozen=True)
 class Grasp:
-    """One hold.
+    """One hold."""
 
-    Attributes:
-        arc_length: where along the hose (m).
-        position: where in the world at first (m).
-        tangent: unit tangent of a clamp at first; None for an attachment.
-        moves: one after the other.
-        spins: one after the other.
-        director: unit vector m1 of the material at a clamp at first, about which
-            `bending_stiffness` bends; None for one of our choice.
-    """
-
-    arc_length: float
-    position: Vector
-    tangent: Vector | None
-    moves: tuple[Movement, ...] = ()
-    spins: tuple[Spin, ...] = ()
+    arc_length: float  # where along the hose (m)
+    position: Vector  # where in the world at first (m)
+    tangent: Vector | None  # unit tangent of a clamp at first; None for an attachment
+    moves: tuple[Movement, ...] = ()  # one after the other
+    spins: tuple[Spin, ...] = ()  # one after the other
+    # Unit vector m1 of the material at a clamp at first, about which `bending_stiffness` bends;
+    # None for one of our choice.
     director: Vector | None = None
 
     @property

@@ -76,44 +76,27 @@ class Place:
 
 @dataclass(frozen=True)
 class Robot(Place):
-    """A robot, by the site where it holds the hose.
+    """A robot, by the site where it holds the hose."""
 
-    Attributes:
-        name: the prefix of its site ("robot0"), or its body's name where there is none.
-        arc_length: where it holds the hose, from the source (m).
-    """
-
-    name: str
-    arc_length: float
+    name: str  # the prefix of its site ("robot0"), or its body's name where there is none
+    arc_length: float  # where it holds the hose, from the source (m)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene.
+    """A checked scene."""
 
-    Attributes:
-        path: its file.
-        digest: SHA-256 over all its files; equal digests are equal scenes.
-        spec: the hose; arc length 0 is at the source, the tip at its length.
-        robots: along the hose, the tip's first.
-        source: the site that holds the hose's beginning.
-        goal: the site that the tip is to reach.
-        bounds: lowest and highest x, y, z for the robots (m); infinite where there is no bound.
-        friction: Coulomb friction coefficient between the hose and the scene.
-        timestep: MuJoCo's step (s).
-        cell_size: width of the square cells around the source in which robots move (m).
-    """
-
-    path: Path
-    digest: str
-    spec: HoseSpec
-    robots: tuple[Robot, ...]
-    source: Place
-    goal: Place
+    path: Path  # its file
+    digest: str  # SHA-256 over all its files; equal digests are equal scenes
+    spec: HoseSpec  # the hose; arc length 0 is at the source, the tip at its length
+    robots: tuple[Robot, ...]  # along the hose, the tip's first
+    source: Place  # the site that holds the hose's beginning
+    goal: Place  # the site that the tip is to reach
+    # Lowest and highest x, y, z for the robots (m); infinite where there is no bound.
     bounds: tuple[Vector, Vector]
-    friction: float
-    timestep: float
-    cell_size: float
+    friction: float  # Coulomb friction coefficient between the hose and the scene
+    timestep: float  # MuJoCo's step (s)
+    cell_size: float  # width of the square cells around the source in which robots move (m)
 
     def make_spec(self) -> Any:
         """Returns the scene as a new `mujoco.MjSpec`, to be extended by a hose and compiled.

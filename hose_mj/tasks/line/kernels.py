@@ -22,26 +22,7 @@ FIXED, RANDOM, ABSENT = 0, 1, 2
 
 
 class Line(NamedTuple):
-    """The rules; state: header, x and y of robots 0 .. N - 1, of the source, of the goals.
-
-    Attributes:
-        n_robots: N.
-        single_agent: whether one agent moves all robots with actions 4 robot + direction.
-        own_goals: whether each robot has a goal of its own (non-cooperative task).
-        cancelling: whether impossible moves are cancelled (the author's rule) before the events.
-        collision: ENTERING, SWEEPING or ROBOTS.
-        half_width: h; the grid is [-h, h]^2.
-        largest_square: square of the longest segment, L_s^2 rounded down.
-        offsets: offsets allowed between neighbours (k, 2).
-        offset_table: their numbers, see `geometry.make_offset_table`.
-        cover_reach, cover_table: m and the table of `geometry.make_cover_table`.
-        random_start: whether the robots' first cells are drawn from the feasible set.
-        starts: their first cells otherwise (N, 2).
-        goal_mode: FIXED, RANDOM or ABSENT.
-        goals: the goals where they are fixed (n_goals, 2).
-        goal_cells: cells that the tip can reach (m, 2).
-        distance_table, direction_table: d_g and theta_g by G - P, (0, 0) in the middle.
-    """
+    """The rules; state: header, x and y of robots 0 .. N - 1, of the source, of the goals."""
 
     n_agents: int
     n_actions: int
@@ -51,22 +32,24 @@ class Line(NamedTuple):
     success: int
     shared: int
     reward_table: Floats
-    n_robots: int
-    single_agent: bool
-    own_goals: bool
-    cancelling: bool
-    collision: int
-    half_width: int
-    largest_square: int
-    offsets: Integers
-    offset_table: Integers
+    n_robots: int  # N
+    single_agent: bool  # whether one agent moves all robots with actions 4 robot + direction
+    own_goals: bool  # whether each robot has a goal of its own (non-cooperative task)
+    cancelling: bool  # whether impossible moves are cancelled (the author's rule) before the events
+    collision: int  # ENTERING, SWEEPING or ROBOTS
+    half_width: int  # h; the grid is [-h, h]^2
+    largest_square: int  # square of the longest segment, L_s^2 rounded down
+    offsets: Integers  # offsets allowed between neighbours (k, 2)
+    offset_table: Integers  # their numbers, see `geometry.make_offset_table`
+    # cover_reach, cover_table: m and the table of `geometry.make_cover_table`.
     cover_reach: int
     cover_table: Bytes
-    random_start: bool
-    starts: Integers
-    goal_mode: int
-    goals: Integers
-    goal_cells: Integers
+    random_start: bool  # whether the robots' first cells are drawn from the feasible set
+    starts: Integers  # their first cells otherwise (N, 2)
+    goal_mode: int  # FIXED, RANDOM or ABSENT
+    goals: Integers  # the goals where they are fixed (n_goals, 2)
+    goal_cells: Integers  # cells that the tip can reach (m, 2)
+    # distance_table, direction_table: d_g and theta_g by G - P, (0, 0) in the middle.
     distance_table: Integers
     direction_table: Integers
 

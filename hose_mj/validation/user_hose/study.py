@@ -88,23 +88,16 @@ GEDS's control points are these times `compute_fineness`.
 
 @dataclass
 class UserHoseStudy:
-    """The findings about a user's hose.
+    """The findings about a user's hose."""
 
-    Attributes:
-        hose: what the file says.
-        result: all runs, against the hose as it is (`stretchable`).
-        stretch: largest distance between the hose as it is and one that does not stretch, as a
-            fraction of the length: what no inextensible model can get below; None without one.
-        refused: why a model did not run, by model.
-        answers: by wanted error and model.
-        disagreements: by model, and by clamp for the chains.
-    """
-
-    hose: UserHose
-    result: CaseResult
+    hose: UserHose  # what the file says
+    result: CaseResult  # all runs, against the hose as it is (`stretchable`)
+    # Largest distance between the hose as it is and one that does not stretch, as a fraction of the
+    # length: what no inextensible model can get below; None without one.
     stretch: float | None = None
-    refused: dict[str, str] = field(default_factory=dict)
-    answers: list[Answer] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)  # why a model did not run, by model
+    answers: list[Answer] = field(default_factory=list)  # by wanted error and model
+    # By model, and by clamp for the chains.
     disagreements: list[Disagreement] = field(default_factory=list)
 
     @property

@@ -33,33 +33,21 @@ class Graph(NamedTuple):
 
     Functions of some agents' actions are numbered: first the edges' payoffs, then what each step of
     the elimination leaves.
-
-    Attributes:
-        edges: pairs of agents, the lower number first (n_edges, 2).
-        degrees: number of edges of each agent (n_agents,).
-        everything: all actions of each agent, as bits (n_agents,).
-        order: the agents as they are eliminated (n_agents,).
-        ranks: the place of each agent in that order (n_agents,).
-        offsets: where each function's values begin (n_functions,).
-        strides: what a step of each agent's action adds; 0 where a function does not depend on it
-            (n_functions, n_agents).
-        sizes: number of values of each function (n_functions,).
-        inputs: functions that each step maximizes, filled up with -1 (n_agents, width).
-        solver: one of the numbers in `solvers.SOLVERS`.
-        rounds: starts of coordinate ascent, or most rounds of messages.
     """
 
-    edges: Integers
-    degrees: Integers
-    everything: Integers
-    order: Integers
-    ranks: Integers
-    offsets: Integers
+    edges: Integers  # pairs of agents, the lower number first (n_edges, 2)
+    degrees: Integers  # number of edges of each agent (n_agents,)
+    everything: Integers  # all actions of each agent, as bits (n_agents,)
+    order: Integers  # the agents as they are eliminated (n_agents,)
+    ranks: Integers  # the place of each agent in that order (n_agents,)
+    offsets: Integers  # where each function's values begin (n_functions,)
+    # What a step of each agent's action adds; 0 where a function does not depend on it
+    # (n_functions, n_agents).
     strides: Integers
-    sizes: Integers
-    inputs: Integers
-    solver: int
-    rounds: int
+    sizes: Integers  # number of values of each function (n_functions,)
+    inputs: Integers  # functions that each step maximizes, filled up with -1 (n_agents, width)
+    solver: int  # one of the numbers in `solvers.SOLVERS`
+    rounds: int  # starts of coordinate ascent, or most rounds of messages
 
 
 def make_graph(

@@ -173,43 +173,28 @@ LEAF = -1
 
 
 class Buffer(NamedTuple):
-    """A balanced training set for each agent: as many instances at most of each action and class.
+    """A balanced training set for each agent: as many instances at most per action and class."""
 
-    Attributes:
-        values: all variables (n_agents, n_actions, 2, capacity, n_variables).
-        counts: how many of the places are taken, the first ones (n_agents, n_actions, 2).
-        seen: how many instances each agent has been given since its last fit (n_agents,).
-    """
-
-    values: Small
-    counts: Integers
-    seen: Integers
+    values: Small  # all variables (n_agents, n_actions, 2, capacity, n_variables)
+    counts: Integers  # how many of the places are taken, the first ones (n_agents, n_actions, 2)
+    seen: Integers  # how many instances each agent has been given since its last fit (n_agents,)
 
 
 class Forest(NamedTuple):
-    """What was learned from the buffer.
+    """What was learned from the buffer."""
 
-    Attributes:
-        feature: what a node splits by, a variable's number or n_variables for the action; LEAF in a
-            leaf (n_agents, n_trees, n_nodes).
-        threshold: a value up to it goes left (n_agents, n_trees, n_nodes).
-        left: the left child (n_agents, n_trees, n_nodes).
-        right: the right child (n_agents, n_trees, n_nodes).
-        undesired: share of undesired instances in a node (n_agents, n_trees, n_nodes).
-        trained: mu_(a, omega), the instances of each action and class that the forest was fitted
-            to (n_agents, n_actions, 2).
-        minimum: mu, the least of them with which an action may be vetoed.
-        veto_probability: actions are vetoed from this probability on.
-    """
-
+    # What a node splits by, a variable's number or n_variables for the action; LEAF in a leaf
+    # (n_agents, n_trees, n_nodes).
     feature: Small
-    threshold: Floats
-    left: Small
-    right: Small
-    undesired: Floats
+    threshold: Floats  # a value up to it goes left (n_agents, n_trees, n_nodes)
+    left: Small  # the left child (n_agents, n_trees, n_nodes)
+    right: Small  # the right child (n_agents, n_trees, n_nodes)
+    undesired: Floats  # share of undesired instances in a node (n_agents, n_trees, n_nodes)
+    # mu_(a, omega), the instances of each action and class that the forest was fitted to (n_agents,
+    # n_actions, 2).
     trained: Integers
-    minimum: int
-    veto_probability: float
+    minimum: int  # mu, the least of them with which an action may be vetoed
+    veto_probability: float  # actions are vetoed from this probability on
 
 
 @jitable
@@ -271,15 +256,10 @@ class, with which the taxi is not learned."""
 
 
 class Usap(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discounts: 1, gamma, .., gamma^N (n_agents + 1,).
-        undesired: the events that make a move undesired.
-    """
-
-    discounts: Floats
-    undesired: int
+    discounts: Floats  # 1, gamma, .., gamma^N (n_agents + 1,)
+    undesired: int  # the events that make a move undesired
 
 
 class Prediction(NamedTuple):

@@ -19,23 +19,17 @@ Flags = npt.NDArray[np.bool_]
 class MarkovModel:
     """A finite decision process <S, A, P, R> whose reward depends on the state that is entered.
 
-    Attributes:
-        transitions: P(s, a, s'), row s n_actions + a, (n_states n_actions, n_states); the rows of a
-            terminal state are empty.
-        rewards: R(s), received when s is entered (n_states,).
-        terminal: whether the episode ends there (n_states,).
-        actions: names of the actions.
-        names: names of the states.
-
     Raises:
         InputError: shapes that do not fit, or rows that are not distributions.
     """
 
+    # P(s, a, s'), row s n_actions + a, (n_states n_actions, n_states); the rows of a terminal state
+    # are empty.
     transitions: csr_array
-    rewards: Floats
-    terminal: Flags
-    actions: tuple[str, ...]
-    names: tuple[str, ...]
+    rewards: Floats  # R(s), received when s is entered (n_states,)
+    terminal: Flags  # whether the episode ends there (n_states,)
+    actions: tuple[str, ...]  # names of the actions
+    names: tuple[str, ...]  # names of the states
 
     def __post_init__(self) -> None:
         n = self.n_states
@@ -64,20 +58,14 @@ class MarkovModel:
 
 @dataclass(frozen=True, eq=False)
 class WrittenTask:
-    """A task as a decision process.
+    """A task as a decision process."""
 
-    Attributes:
-        model: the process. Its states are those of the task together with the events of the move
-            that led there, which is what rewards and ends depend on.
-        states: the task's states, step count 0 (n_states, state_size).
-        events: events of the move that led there (n_states,).
-        numbers: (state's bytes, events) to the number of the state.
-    """
-
+    # The process. Its states are those of the task together with the events of the move that led
+    # there, which is what rewards and ends depend on.
     model: MarkovModel
-    states: Integers
-    events: Integers
-    numbers: dict[tuple[bytes, int], int]
+    states: Integers  # the task's states, step count 0 (n_states, state_size)
+    events: Integers  # events of the move that led there (n_states,)
+    numbers: dict[tuple[bytes, int], int]  # (state's bytes, events) to the number of the state
 
 
 def write_out(task: Task, starts: Iterable[Integers], limit: int = 10**5) -> WrittenTask:

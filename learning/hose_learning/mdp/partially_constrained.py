@@ -29,23 +29,14 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class PcmViolation:
-    """A property of Definition 11 that does not hold.
+    """A property of Definition 11 that does not hold."""
 
-    Attributes:
-        number: 1 to 4, a key of `PROPERTIES`.
-        count: states, or states and actions, at which it does not.
-        state: number of the first such target state.
-        action: the action there; None where the property is about states.
-        source: what the source says there, in words.
-        target: what the target says there.
-    """
-
-    number: int
-    count: int
-    state: int
-    action: int | None
-    source: str
-    target: str
+    number: int  # 1 to 4, a key of `PROPERTIES`
+    count: int  # states, or states and actions, at which it does not
+    state: int  # number of the first such target state
+    action: int | None  # the action there; None where the property is about states
+    source: str  # what the source says there, in words
+    target: str  # what the target says there
 
     def __str__(self) -> str:
         return f"property {self.number} ({PROPERTIES[self.number]}) has exceptions: {self.count}"

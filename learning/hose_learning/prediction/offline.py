@@ -90,29 +90,20 @@ CONFIDENCE = 0.99
 class OfflinePlan:
     """What is to be measured.
 
-    Attributes:
-        task: id of the task.
-        cycles: moves of each agent in a log.
-        logs: number of logs. The first is measured as the thesis's was, the others once each, for
-            how much the numbers differ from log to log.
-        repeats: how often the folds of the first log are drawn anew.
-        folds: parts that each agent's moves are split into.
-        encoding: how states and actions become attributes.
-        cluster_rule: how clusters become classes, see `ClusterClassifier`.
-        seed: of everything random.
-
     Raises:
         InputError: fewer than one cycle or log, or a negative seed.
     """
 
-    task: str = "taxi"
-    cycles: int = 2002
+    task: str = "taxi"  # id of the task
+    cycles: int = 2002  # moves of each agent in a log
+    # Number of logs. The first is measured as the thesis's was, the others once each, for how much
+    # the numbers differ from log to log.
     logs: int = 8
-    repeats: int = 10
-    folds: int = 10
-    encoding: Encoding = field(default_factory=Encoding)
-    cluster_rule: ClusterRule = "matched"
-    seed: int = 0
+    repeats: int = 10  # how often the folds of the first log are drawn anew
+    folds: int = 10  # parts that each agent's moves are split into
+    encoding: Encoding = field(default_factory=Encoding)  # how states and actions become attributes
+    cluster_rule: ClusterRule = "matched"  # how clusters become classes, see `ClusterClassifier`
+    seed: int = 0  # of everything random
 
     def __post_init__(self) -> None:
         for name in ("cycles", "logs"):

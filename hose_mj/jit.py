@@ -36,8 +36,7 @@ _OPTIONS: dict[str, Any] = {
 _PACKAGE = Path(__file__).resolve().parent
 _ENVIRONMENT = "_ZN08NumbaEnv"
 _DECLARE = '@"{}" = common global i64 0\n'
-_MADE: set[Any] = set()
-"""What `_decorate` made, to tell ours from other people's."""
+_MADE: set[Any] = set()  # what `_decorate` made, to tell ours from other people's
 
 
 def _keep_known(**options: bool) -> dict[str, bool]:

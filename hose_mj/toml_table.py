@@ -13,8 +13,7 @@ from typing import Any
 
 from hose_mj.errors import InputError
 
-LARGEST_FILE = 1_000_000
-"""Bytes; a description of a hose has some hundred."""
+LARGEST_FILE = 1_000_000  # bytes; a description of a hose has some hundred
 LARGEST_NUMBER = 1e15
 _SHOWN = 80
 

@@ -40,24 +40,18 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional] = "floor_2"
     """A shipped scene, or your own MJCF file."""
-    models: tuple[str, ...] = ("geds", "cable", "flex")
-    """Hose models; each is compared with each."""
-    sequences: int = 200
-    """How many sequences of moves."""
-    moves: int = 24
-    """Moves in a sequence at most."""
-    quick: bool = False
-    """Play 20 sequences, with geds and flex."""
+    models: tuple[str, ...] = ("geds", "cable", "flex")  # Hose models; each is compared with each.
+    sequences: int = 200  # How many sequences of moves.
+    moves: int = 24  # Moves in a sequence at most.
+    quick: bool = False  # Play 20 sequences, with geds and flex.
     control_points: int | None = None
     """Control points of geds; by default twice as many as its world takes by itself, see docs."""
     max_tension: float | None = None
     """Tension that breaks a segment (N); by default the rule of the constraints."""
     out: Path | None = None
     """Folder to keep the endings in; the command goes on from those that are there."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the moves."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the moves.
 
 
 def run(args: Args) -> int:

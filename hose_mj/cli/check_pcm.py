@@ -40,26 +40,18 @@ class Args:
 
     source: Annotated[str | None, tyro.conf.Positional] = None
     """Id of the task that is learnt first."""
-    target: Annotated[str | None, tyro.conf.Positional] = None
-    """Id of the task that is wanted."""
+    target: Annotated[str | None, tyro.conf.Positional] = None  # Id of the task that is wanted.
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Options of both tasks, or of one: source.NAME=VALUE, target.NAME=VALUE."""
-    example: str | None = None
-    """A ready pair instead of two tasks."""
-    list: bool = False
-    """List the ready pairs."""
+    example: str | None = None  # A ready pair instead of two tasks.
+    list: bool = False  # List the ready pairs.
     reading: Literal["equal", "signs"] = "equal"
     """Property 4 compares rewards of undesired states, or their signs only."""
-    discount: float = 0.9
-    """Discount gamma of the values that Proposition 5 is about."""
-    limit: int = 100_000
-    """Largest number of states of a task."""
-    out: Path | None = None
-    """Folder for a picture of a PCM's values."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the start, where it is random."""
+    discount: float = 0.9  # Discount gamma of the values that Proposition 5 is about.
+    limit: int = 100_000  # Largest number of states of a task.
+    out: Path | None = None  # Folder for a picture of a PCM's values.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the start, where it is random.
 
 
 def run(args: Args) -> int:

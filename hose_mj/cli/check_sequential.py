@@ -26,20 +26,14 @@ class Args:
     witness: the state, the action, and what comes of both.
     """
 
-    task: Annotated[str, tyro.conf.Positional]
-    """Id of the task."""
+    task: Annotated[str, tyro.conf.Positional]  # Id of the task.
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Options of the task."""
-    idle: str = "none"
-    """The action that stands for none."""
-    sharing: Literal["team", "each"] = "team"
-    """Compare the team's reward, or what each agent gets."""
-    limit: int = 100_000
-    """Largest number of states."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the start, where it is random."""
+    idle: str = "none"  # The action that stands for none.
+    sharing: Literal["team", "each"] = "team"  # Compare the team's reward, or what each agent gets.
+    limit: int = 100_000  # Largest number of states.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the start, where it is random.
 
 
 def run(args: Args) -> int:

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 MODELS = ("geds", "cable", "flex", "hinge-chain")
 OUT = Path("out/compare")
-QUICK_SHARE = 1.0 / 3.0
-"""Of its budget that a user's hose gets with --quick."""
+QUICK_SHARE = 1.0 / 3.0  # of its budget that a user's hose gets with --quick
 _MY_HOSE = tyro.conf.arg(metavar="[MY_HOSE.toml]")
 
 
@@ -55,10 +54,8 @@ class Args:
     quick: bool = False
     """A smaller grid, about two minutes once compiled. For your own hose:
     a third of its budget."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the random states."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the random states.
 
 
 def run(args: Args) -> int:

@@ -68,10 +68,8 @@ class Args:
     fish: hose-mj completion fish > ~/.config/fish/completions/hose-mj.fish
     """
 
-    shell: Annotated[str, tyro.conf.Positional]
-    """bash, zsh or fish."""
-    json: bool = False
-    """Print the words as one JSON document instead of a script."""
+    shell: Annotated[str, tyro.conf.Positional]  # bash, zsh or fish.
+    json: bool = False  # Print the words as one JSON document instead of a script.
 
 
 def run(args: Args) -> int:

@@ -49,8 +49,7 @@ CABLE_SCENE = """
 class Args:
     """Check that this installation has what hose_mj needs."""
 
-    json: bool = False
-    """Print one JSON document instead of the table."""
+    json: bool = False  # Print one JSON document instead of the table.
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,7 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional]
     """A shipped scene (floor_1 to floor_6, corridor, deck, lift), or your own MJCF file."""
-    model: str = "geds"
-    """The hose's model: geds, cable or flex."""
+    model: str = "geds"  # The hose's model: geds, cable or flex.
     json: bool = False
     """Print one JSON document on stdout when the window is closed; messages go to stderr."""
 

@@ -30,8 +30,7 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-LARGEST = 20_000
-"""Most states of a task whose joint optimum is searched."""
+LARGEST = 20_000  # most states of a task whose joint optimum is searched
 
 
 @dataclass(frozen=True)
@@ -43,20 +42,13 @@ class Args:
     all joint moves finds: so the task has to be a small one.
     """
 
-    task: Annotated[str, tyro.conf.Positional] = "corridor"
-    """Id of the task."""
-    learner: str = "d-rr-ql"
-    """A learner whose agents move in turns."""
-    set: tuple[str, ...] = ()
-    """Options of the task, as n_robots=3 goal=(2,1)."""
-    episodes: int = 2000
-    """Episodes to train for; epsilon falls from 1 to 0 over half of them."""
-    moves: int = 20_000
-    """Moves of single agents that transitions and rewards are estimated from."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the training, the play and the initial state."""
+    task: Annotated[str, tyro.conf.Positional] = "corridor"  # Id of the task.
+    learner: str = "d-rr-ql"  # A learner whose agents move in turns.
+    set: tuple[str, ...] = ()  # Options of the task, as n_robots=3 goal=(2,1).
+    episodes: int = 2000  # Episodes to train for; epsilon falls from 1 to 0 over half of them.
+    moves: int = 20_000  # Moves of single agents that transitions and rewards are estimated from.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the training, the play and the initial state.
 
 
 def run(args: Args) -> int:

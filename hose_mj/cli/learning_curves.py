@@ -54,28 +54,18 @@ class Args(train.LearnerArgs):
     are not given are those of `hose-mj train`.
     """
 
-    task: Annotated[str, tyro.conf.Positional] = "line"
-    """A task (hose-mj train --list names all)."""
-    learners: tuple[str, ...] = ("d-rr-ql",)
-    """The learners to compare."""
-    measures: tuple[str, ...] = ("success",)
-    """What to draw, a panel each: success, moves, return."""
+    task: Annotated[str, tyro.conf.Positional] = "line"  # A task (hose-mj train --list names all).
+    learners: tuple[str, ...] = ("d-rr-ql",)  # The learners to compare.
+    measures: tuple[str, ...] = ("success",)  # What to draw, a panel each: success, moves, return.
     options: tuple[str, ...] = ()
     """Options of the learners' own: trace_decay=0.8 for all, usap.classifier=forest for one."""
-    episodes: int = 2_000
-    """Episodes of each training."""
-    bins: int = 50
-    """Points of each line."""
-    seeds: int = 5
-    """Trainings of each learner."""
-    title: str | None = None
-    """Above the picture; by default the task and its options."""
-    save: Path = Path("out/curves.png")
-    """The picture (PNG)."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """The first seed; the others follow it."""
+    episodes: int = 2_000  # Episodes of each training.
+    bins: int = 50  # Points of each line.
+    seeds: int = 5  # Trainings of each learner.
+    title: str | None = None  # Above the picture; by default the task and its options.
+    save: Path = Path("out/curves.png")  # The picture (PNG).
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # The first seed; the others follow it.
 
 
 def run(args: Args) -> int:

@@ -21,8 +21,7 @@ class Args:
 
     kind: Annotated[str, tyro.conf.Positional]
     """scenes, hoses, materials, models, policies, tasks, learners or environments."""
-    json: bool = False
-    """Print one JSON document on stdout."""
+    json: bool = False  # Print one JSON document on stdout.
 
 
 def run(args: Args) -> int:

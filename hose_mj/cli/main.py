@@ -34,7 +34,7 @@ class CommandModule(Protocol):
     """What the module of a sub-command defines.
 
     Attributes:
-        Args: frozen dataclass of its arguments; its docstrings are the `--help`.
+        Args: frozen dataclass of its arguments; what is said of them is the `--help`.
         run: takes an `Args` and returns the exit status.
     """
 

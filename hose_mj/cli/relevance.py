@@ -24,8 +24,7 @@ from hose_mj.cli.results import check_counts, finish, print_table
 from hose_mj.cli.task_options import parse_options
 from hose_mj.tasks.registry import make_task
 
-WIDEST = 6
-"""Most signals that stand side by side."""
+WIDEST = 6  # most signals that stand side by side
 
 
 @dataclass(frozen=True)
@@ -36,24 +35,18 @@ class Args:
     variables found are checked against a fresh log, in which they must tell every event.
     """
 
-    task: Annotated[str, tyro.conf.Positional]
-    """Id of the task."""
-    moves: int = 10_000
-    """Random moves of single agents to log."""
-    set: tuple[str, ...] = ()
-    """Options of the task, as n_robots=3 goal=(2,1)."""
+    task: Annotated[str, tyro.conf.Positional]  # Id of the task.
+    moves: int = 10_000  # Random moves of single agents to log.
+    set: tuple[str, ...] = ()  # Options of the task, as n_robots=3 goal=(2,1).
     variables: tuple[str, ...] = ()
     """Variables to test; by default all but the copies of an agent's own."""
     pooled: bool = False
     """Compare moves of different agents too, as if their vetoes shared one table."""
     logs: int = 1
     """Logs, each with a seed of its own; with several the matrix shows how many agree."""
-    fresh: int = 100_000
-    """Moves of the log that the first log's result is checked against."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the moves."""
+    fresh: int = 100_000  # Moves of the log that the first log's result is checked against.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the moves.
 
 
 def run(args: Args) -> int:

@@ -29,18 +29,12 @@ class Args:
 
     items: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """fig-4.2, fig-5.3, table-6.3, fig-6.4; all of them by default."""
-    seeds: int = 10
-    """How many seeds, counted from --seed."""
-    quick: bool = False
-    """Two seeds."""
-    workers: int | None = None
-    """Processes; as many as there are cores by default."""
-    out: Path = Path("out/reproduce")
-    """Where the runs are kept."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """The first seed."""
+    seeds: int = 10  # How many seeds, counted from --seed.
+    quick: bool = False  # Two seeds.
+    workers: int | None = None  # Processes; as many as there are cores by default.
+    out: Path = Path("out/reproduce")  # Where the runs are kept.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # The first seed.
 
 
 def run(args: Args) -> int:

@@ -46,29 +46,21 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional]
     """A shipped scene (floor_1 to floor_6, corridor, deck, lift), or your own MJCF file."""
-    model: str = "geds"
-    """The hose's model: geds, cable or flex."""
+    model: str = "geds"  # The hose's model: geds, cable or flex.
     models: tuple[str, ...] = ()
     """Two models instead of one: both episodes run and are shown overlaid."""
     policy: str = "to-goal"
     """random, to-goal, break-stretch, break-run-over, break-collision, break-obstacle,
     break-bounds, or the run folder of a learner (hose-mj train line)."""
-    duration: float = 5.0
-    """Simulated time after which the episode ends (s)."""
-    save: Path | None = None
-    """Write a Rerun recording, F.rrd; open it with hose-mj view."""
-    spawn: bool = False
-    """Open Rerun's viewer and show the episode while it runs."""
+    duration: float = 5.0  # Simulated time after which the episode ends (s).
+    save: Path | None = None  # Write a Rerun recording, F.rrd; open it with hose-mj view.
+    spawn: bool = False  # Open Rerun's viewer and show the episode while it runs.
     connect: str | None = None
     """Show it in a viewer that listens at this URL, as rerun+http://127.0.0.1:9876/proxy."""
-    mp4: Path | None = None
-    """Write a film."""
-    csv: Path | None = None
-    """Write a table: a row for each sample."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of everything that is left to chance."""
+    mp4: Path | None = None  # Write a film.
+    csv: Path | None = None  # Write a table: a row for each sample.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of everything that is left to chance.
 
 
 @dataclass(frozen=True)

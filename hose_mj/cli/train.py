@@ -38,18 +38,13 @@ SAVE_SECONDS = 60.0
 class LearnerArgs:
     """What every command that trains lets a user set about task and learner."""
 
-    set: tuple[str, ...] = ()
-    """Options of the task, as n_robots=3 goal=(2,1)."""
-    epsilon: float | None = None
-    """Share of random choices at the start."""
+    set: tuple[str, ...] = ()  # Options of the task, as n_robots=3 goal=(2,1).
+    epsilon: float | None = None  # Share of random choices at the start.
     epsilon_per_episode: float | None = None
     """What epsilon falls by after each episode; by default it reaches 0 after half of them."""
-    epsilon_per_success: float | None = None
-    """What epsilon falls by after each success."""
-    learning_rate: float | None = None
-    """Alpha."""
-    discount: float | None = None
-    """Gamma."""
+    epsilon_per_success: float | None = None  # What epsilon falls by after each success.
+    learning_rate: float | None = None  # Alpha.
+    discount: float | None = None  # Gamma.
     values: str | None = None
     """What the value modules see: goal, local or monolithic; the default depends on the learner."""
     vetoes: str | None = None
@@ -68,25 +63,19 @@ class Args(LearnerArgs):
     """A task: line, taxi, corridor, maze, ... (--list names all)."""
     learner: str | None = None
     """A learner; by default thresholded-msav on the line tasks and d-rr-ql on the others."""
-    list: bool = False
-    """List tasks and learners and stop."""
-    options: tuple[str, ...] = ()
-    """Options of the learner's own, as trace_decay=0.8."""
+    list: bool = False  # List tasks and learners and stop.
+    options: tuple[str, ...] = ()  # Options of the learner's own, as trace_decay=0.8.
     episodes: int | None = None
     """Episodes to train for, counted from the start of the run; the default depends on the task, or
     with --resume on what the run was to end after."""
     moves: int | None = None
     """Moves of single agents after which training ends, if that comes first."""
-    tests: int = 200
-    """Greedy episodes after training."""
-    out: Path | None = None
-    """Run folder; by default a new one, out/train/TASK-LEARNER-seedN."""
+    tests: int = 200  # Greedy episodes after training.
+    out: Path | None = None  # Run folder; by default a new one, out/train/TASK-LEARNER-seedN.
     resume: Path | None = None
     """Run folder to go on with; its settings replace all that describe a run."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of everything that is left to chance."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of everything that is left to chance.
 
 
 def run(args: Args) -> int:

@@ -29,26 +29,19 @@ class Args:
     explores the target from scratch for the same cost.
     """
 
-    source: Annotated[str, tyro.conf.Positional]
-    """Id of the task to learn on first."""
-    target: Annotated[str, tyro.conf.Positional]
-    """Id of the task that it is for."""
+    source: Annotated[str, tyro.conf.Positional]  # Id of the task to learn on first.
+    target: Annotated[str, tyro.conf.Positional]  # Id of the task that it is for.
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Options of both tasks, or of one: source.NAME=VALUE, target.NAME=VALUE."""
-    moves: int = 300_000
-    """Moves of single agents on the source."""
-    episodes: int = 3
-    """Greedy learning episodes on the target."""
-    configurations: int = 30
-    """How often all this is done."""
+    moves: int = 300_000  # Moves of single agents on the source.
+    episodes: int = 3  # Greedy learning episodes on the target.
+    configurations: int = 30  # How often all this is done.
     values: str = "goal"
     """What the goal modules see: goal (on a line, all robots' formation), local or monolithic."""
     exchange: tuple[float, ...] = (390_000.0, 1.0)
     """What a move on the target costs, in moves on the source; the thesis's, and equal cost."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of all that is left to chance."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of all that is left to chance.
 
 
 def run(args: Args) -> int:

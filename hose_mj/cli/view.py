@@ -22,8 +22,7 @@ class Args:
     """Write a picture (PNG) instead of opening a window; needs no display."""
     at: float | None = None
     """Simulated time to show (s); by default that of the break, else the last sample."""
-    json: bool = False
-    """Print one JSON document about the recording."""
+    json: bool = False  # Print one JSON document about the recording.
 
 
 def run(args: Args) -> int:

@@ -33,8 +33,7 @@ class Args:
 
     groups: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="GROUP")] = ()
     """hose, world, learn; all of them by default."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
 
 
 def run(args: Args) -> int:

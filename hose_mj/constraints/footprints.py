@@ -23,13 +23,11 @@ from hose_mj.world.world import World
 
 TOUCH, TOUCH_RADII = 2e-3, 0.05
 """A robot stands on what is nearer than this (m), or than this part of its radius."""
-STEEPEST = 0.7
-"""Cosine of the steepest ground that a robot stands on: 45 degrees."""
+STEEPEST = 0.7  # cosine of the steepest ground that a robot stands on: 45 degrees
 _ROUNDING = 1e-9
 _ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
 _CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
-CHORDS = 4
-"""Capsules in a piece of the centre line."""
+CHORDS = 4  # capsules in a piece of the centre line
 
 
 @dataclass(frozen=True)

@@ -110,5 +110,4 @@ KINDS = (
         other="geom",
     ),
 )
-KIND_OF = {kind.name: kind for kind in KINDS}
-"""Kinds by name."""
+KIND_OF = {kind.name: kind for kind in KINDS}  # kinds by name

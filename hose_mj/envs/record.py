@@ -15,8 +15,7 @@ from hose_mj.envs.episode import Episode
 from hose_mj.errors import InputError
 from hose_mj.recording.keep import Keep, Played, RecordingFolder
 
-GOAL = "goal"
-"""Event that counts as success."""
+GOAL = "goal"  # event that counts as success
 
 
 class Source(Protocol):

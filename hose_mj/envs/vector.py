@@ -26,8 +26,7 @@ from hose_mj.tasks.task import Task
 
 _LEAST_COPIES = 128
 """With fewer copies for each core, one core is faster than several that wait for each other."""
-_PARTS = 4
-"""Parts of the copies for each core: some episodes take longer to start than others."""
+_PARTS = 4  # parts of the copies for each core: some episodes take longer to start than others
 
 Booleans = np.ndarray[Any, np.dtype[np.bool_]]
 Result = tuple[Any, Floats, Booleans, Booleans, dict[str, Any]]

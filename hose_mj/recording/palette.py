@@ -8,8 +8,7 @@ plug-in, has a spare colour.
 import numpy as np
 from numpy.typing import NDArray
 
-Rgb = tuple[int, int, int]
-"""Red, green, blue, each 0 to 255."""
+Rgb = tuple[int, int, int]  # red, green, blue, each 0 to 255
 
 COLORS: dict[str, Rgb] = {
     "geds": (0, 114, 178),
@@ -38,8 +37,7 @@ LIMIT: Rgb = (160, 40, 40)
 OTHERS: tuple[Rgb, ...] = ((230, 159, 0), (0, 114, 178), (120, 94, 200), (100, 100, 60))
 
 
-LOWEST_TENSION = -0.25
-"""Lowest tension that has a colour of its own, as a fraction of the limit."""
+LOWEST_TENSION = -0.25  # lowest tension that has a colour of its own, as a fraction of the limit
 _FRACTIONS = np.array([LOWEST_TENSION, 0.0, 0.35, 0.7, 1.0])
 _TENSION_COLORS = np.array(
     [[60, 120, 230], [214, 222, 230], [248, 214, 70], [244, 130, 30], [214, 30, 40]],

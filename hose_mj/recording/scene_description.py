@@ -20,8 +20,7 @@ from hose_mj.recording.episode import (
 from hose_mj.recording.palette import Rgb
 
 GEOM_KINDS = ("plane", "box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh")
-WORLD = -1
-"""Body of what does not move."""
+WORLD = -1  # body of what does not move
 Rgba = tuple[int, int, int, int]
 
 

@@ -14,8 +14,7 @@ from hose_mj.errors import InputError
 from hose_mj.recording.episode import Array, check_name, check_rising, check_shape, lock_array
 from hose_mj.recording.scene_description import SceneDescription
 
-NO_TURN = -1
-"""Turn of a sample of an episode that has none."""
+NO_TURN = -1  # turn of a sample of an episode that has none
 
 
 def make_row_type(scene: SceneDescription) -> np.dtype[Any]:

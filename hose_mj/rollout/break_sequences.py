@@ -19,8 +19,7 @@ from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
 MOVES = ("up", "down", "left", "right")
-KEEP = 0.7
-"""How likely a robot that moves again goes on as before: random walks would stay at home."""
+KEEP = 0.7  # how likely a robot that moves again goes on as before: random walks would stay at home
 Move = tuple[int, str]
 
 

@@ -24,8 +24,7 @@ from hose_mj.world.scene_geoms import KIND_NAMES
 from hose_mj.world.world import World
 
 KIND_STYLES = tuple(scene_description.KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
-N_POINTS = 81
-"""Points along the hose that are recorded."""
+N_POINTS = 81  # points along the hose that are recorded
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows geoms and sites of groups 0, 1 and 2
 _ELLIPSOID, _MESH = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID), int(mujoco.mjtGeom.mjGEOM_MESH)
 _KINDS = {**KIND_NAMES, _ELLIPSOID: "ellipsoid", _MESH: "mesh"}

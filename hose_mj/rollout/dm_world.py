@@ -30,11 +30,9 @@ try:
 except ImportError as error:
     raise MissingExtra("cable", "a world as a dm_control environment") from error
 
-HOSE = "shown_hose/"
-"""Prefix of the bodies that show a hose that is not part of MuJoCo's model."""
+HOSE = "shown_hose/"  # prefix of the bodies that show a hose that is not part of MuJoCo's model
 N_PIECES = 60
-N_POINTS = 33
-"""Points along the hose in an observation."""
+N_POINTS = 33  # points along the hose in an observation
 
 
 class WorldPhysics(dm_mujoco.Physics):

@@ -13,8 +13,7 @@ from hose_mj.errors import InputError
 from hose_mj.world.world import World
 
 EndedBy = Literal["break", "goal", "duration"]
-SAMPLE_RATE = 25.0
-"""Samples per simulated second: what a film shows."""
+SAMPLE_RATE = 25.0  # samples per simulated second: what a film shows
 
 
 class Policy(Protocol):

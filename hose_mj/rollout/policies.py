@@ -33,8 +33,7 @@ from hose_mj.world.world import World
 
 Cell = tuple[int, int, int]
 HOSE_SAMPLES = 129
-_CLEARANCE = 0.15
-"""Distance kept to obstacles, as a share of a cell."""
+_CLEARANCE = 0.15  # distance kept to obstacles, as a share of a cell
 
 
 class FreeCells:
@@ -355,12 +354,10 @@ def make_policy(name: str) -> Policy:
 
 SLOW_MODELS = ("cable", "flex")
 MOST_TRIALS = 24
-LONGEST, LONGEST_OF_ALL = 5.0, 20.0
-"""Simulated time of a trial, and of all, at most (s)."""
+LONGEST, LONGEST_OF_ALL = 5.0, 20.0  # simulated time of a trial, and of all, at most (s)
 SLOWNESS = 4.0
 """How often time simulated with one of MuJoCo's hoses counts: it takes several times as long."""
-PATIENCE = 1.5
-"""How much longer than its targets take a trial goes on, and a second more."""
+PATIENCE = 1.5  # how much longer than its targets take a trial goes on, and a second more
 
 
 @dataclass(frozen=True)

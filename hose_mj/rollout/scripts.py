@@ -99,14 +99,10 @@ class Player:
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
 _DETOURS = tuple(math.radians(a) for a in (30, -30, 60, -60))
-_BEYOND = 1.5
-"""How much farther than a segment is long its ends are driven apart."""
-_BEHIND = 0.5
-"""How far behind an obstacle or a bound a robot is driven, in cells."""
-_SLACK = 0.95
-"""Share of a segment that neighbours may be apart where some follow another."""
-_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)
-"""Where along a segment it is run over, the middle first."""
+_BEYOND = 1.5  # how much farther than a segment is long its ends are driven apart
+_BEHIND = 0.5  # how far behind an obstacle or a bound a robot is driven, in cells
+_SLACK = 0.95  # share of a segment that neighbours may be apart where some follow another
+_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)  # where along a segment it is run over, the middle first
 
 
 def list_stretches(driver: Driver) -> list[Script]:

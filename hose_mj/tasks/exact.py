@@ -12,8 +12,7 @@ from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import NOT_FOUND, STEPS, TOO_MANY, TURN, Floats, Integers
 from hose_mj.tasks.task import Task
 
-OVER = -1
-"""The successor of a move that ends the episode."""
+OVER = -1  # the successor of a move that ends the episode
 
 
 @dataclass(frozen=True)

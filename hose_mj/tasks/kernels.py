@@ -32,8 +32,7 @@ from hose_mj.jit import compiled, jitable
 from hose_mj.tasks.stream import Stream, draw_below
 
 TURN, STEPS = 0, 1
-HEADER = 2
-"""Where a task's own part of the state begins."""
+HEADER = 2  # where a task's own part of the state begins
 
 Integers = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]

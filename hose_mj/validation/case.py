@@ -32,11 +32,9 @@ ROD = replace(STOUT, axial_stiffness=4e5 * BENDING_STIFFNESS)
 """The hose of the motions: EA L^2 / EI = 4e5."""
 CHAIN = replace(STOUT, axial_stiffness=1e5, bending_stiffness=1e-7, torsional_stiffness=1e-2)
 """A chain: EI / (w L^3) = 1e-7."""
-STIFFENING = 1e3
-"""EA of the reference for inextensible models, over that of the case."""
+STIFFENING = 1e3  # EA of the reference for inextensible models, over that of the case
 GRAVITY = 9.81
-DOWN = (0.0, 0.0, -GRAVITY)
-"""The gravity of most motions (m/s^2)."""
+DOWN = (0.0, 0.0, -GRAVITY)  # the gravity of most motions (m/s^2)
 WEIGHT = LINEAR_DENSITY * GRAVITY * LENGTH
 UNIT_FREQUENCY = math.sqrt(BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**4))
 

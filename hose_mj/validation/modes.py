@@ -8,8 +8,7 @@ from scipy.optimize import brentq
 
 from hose_mj.hoses.protocol import Array, Linearization
 
-_SAME = 1e-4
-"""Relative distance below which two frequencies count as one mode seen in two planes."""
+_SAME = 1e-4  # relative distance below which two frequencies count as one mode seen in two planes
 
 
 def compute_frequencies(small: Linearization, n_modes: int, above: float) -> Array:

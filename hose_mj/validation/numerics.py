@@ -22,18 +22,15 @@ from hose_mj.validation.modes import compute_frequencies
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import Setting
 
-Curves = dict[str, tuple[list[float], list[float]]]
-"""Label -> (x, error) of a convergence plot."""
+Curves = dict[str, tuple[list[float], list[float]]]  # label -> (x, error) of a convergence plot
 Kind = tuple[str | None, int]
 """A plane or a form of twist, and control points: what steps are timed by."""
-FORMS = ("scalar", "theta")
-"""The two ways in which GEDS carries twist."""
+FORMS = ("scalar", "theta")  # the two ways in which GEDS carries twist
 FLEX_CASE = "released-rod"
 FLEX_SEGMENTS = 20
 FLEX_STEPS = (0.004, 0.002, 0.001)
 """Time steps (s) of the flex rod; its default edges have a time constant of two steps."""
-_SETTLING = 20
-"""Turns after which a precessing rod has settled."""
+_SETTLING = 20  # turns after which a precessing rod has settled
 
 
 def measure_order(sizes: list[float], errors: list[float]) -> float:

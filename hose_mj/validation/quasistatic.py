@@ -20,10 +20,8 @@ from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compiled, kernel
 
 _AXES = (0.0, 0.0)
-WIDTH = 8
-"""Columns of the band that `factorize` expects; the chain fills six."""
-_ITERATIONS = 200
-"""Newton steps after which an increment that has not converged is given up."""
+WIDTH = 8  # columns of the band that `factorize` expects; the chain fills six
+_ITERATIONS = 200  # Newton steps after which an increment that has not converged is given up
 
 
 class Chain(NamedTuple):

@@ -11,8 +11,7 @@ from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 
-N_STEPS = 3
-"""Steps taken from each state."""
+N_STEPS = 3  # steps taken from each state
 
 
 @dataclass

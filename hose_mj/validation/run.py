@@ -15,14 +15,10 @@ from hose_mj.validation.settings import MOST_UNSTABLE, STAGNATION, Grid, Setting
 LOST = 0.5
 """A chain's error above this fraction counts as unstable even where no number overflowed, but in
 cases where models are expected to differ."""
-EQUAL_ERRORS = (0.01, 0.001)
-"""Errors at which costs are compared."""
-N_CONTENDERS = 2
-"""Runs of each model that are timed again at each of these errors."""
-REFERENCE_POINTS = 48
-"""Control points of the references of the cases."""
-BUDGET_SPENT = "the budget was spent"
-"""The reason of a run that did not start any more."""
+EQUAL_ERRORS = (0.01, 0.001)  # errors at which costs are compared
+N_CONTENDERS = 2  # runs of each model that are timed again at each of these errors
+REFERENCE_POINTS = 48  # control points of the references of the cases
+BUDGET_SPENT = "the budget was spent"  # the reason of a run that did not start any more
 N_DRAWN, N_DRAWN_IN_SPACE = 41, 601
 """Points along the hose that are kept for pictures; a coil needs more."""
 

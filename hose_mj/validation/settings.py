@@ -14,10 +14,8 @@ STEP_UNIT = 0.02
 """Time steps are this over a whole number, so that they divide the pauses between samples (s)."""
 LARGEST_STEP = STEP_UNIT / 2
 SMALLEST_STEP = 1e-6
-RAW_CLAMPS = (10, 20, 40, 80)
-"""Segments with which MuJoCo's clamp is also run as documented."""
-MOST_UNSTABLE = 10
-"""A chain that is unstable at the first so many time steps is given up."""
+RAW_CLAMPS = (10, 20, 40, 80)  # segments with which MuJoCo's clamp is also run as documented
+MOST_UNSTABLE = 10  # a chain that is unstable at the first so many time steps is given up
 STAGNATION = 0.15
 """A chain's time step is halved, from the largest stable one on, until a halving takes less than
 this fraction off its error."""

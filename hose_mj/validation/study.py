@@ -27,8 +27,7 @@ from hose_mj.validation.settings import FULL, QUICK
 from hose_mj.validation.user_hose.case import CASE_ID
 from hose_mj.validation.user_hose.study import UserHoseStudy, run_user_hose_study
 
-SHOWN_WITHIN = 0.01
-"""Pictures of a case show the cheapest run of each model within this error."""
+SHOWN_WITHIN = 0.01  # pictures of a case show the cheapest run of each model within this error
 N_RANDOM_STATES = 100_000
 N_RANDOM_STATES_QUICK = 500
 

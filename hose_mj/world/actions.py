@@ -27,8 +27,7 @@ STEPS = {
     "-z": (0, 0, -1),
 }
 """Cells by which each action moves a robot."""
-FLOOR_CELL = 0.05
-"""Width of the thesis's cells (m), for which its tolerances and times are stated."""
+FLOOR_CELL = 0.05  # width of the thesis's cells (m), for which its tolerances and times are stated
 
 Mode = Literal["drive", "force"]
 Cells = npt.NDArray[np.int64]

@@ -15,13 +15,11 @@ from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.mujoco_scene import HoseContact, Numerics
 from hose_mj.world.mujoco_world import MujocoWorld
 
-_SAFETY = 0.5
-"""Of MuJoCo's default step over the largest stable one of a free chain."""
+_SAFETY = 0.5  # of MuJoCo's default step over the largest stable one of a free chain
 _LONGEST = 5e-4
 """Largest default step of MuJoCo's (s): a taut chain that jerks is stiff, whatever bends it."""
 
-_HIDDEN = 4
-"""Group of geoms that viewers do not draw unless asked."""
+_HIDDEN = 4  # group of geoms that viewers do not draw unless asked
 
 
 class CableWorld(MujocoWorld):

@@ -23,10 +23,8 @@ from hose_mj.scenes.mjcf.model import reset_to_start
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.scene_geoms import OWN_ARC, SceneGeoms, compute_radius, find_colliding
 
-PREFIX = "hose/"
-"""Of the names of all that is added to a scene."""
-HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]
-"""MuJoCo's solimp of ties and edges."""
+PREFIX = "hose/"  # of the names of all that is added to a scene
+HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]  # MuJoCo's solimp of ties and edges
 
 
 @dataclass(frozen=True)

@@ -130,8 +130,7 @@ def _read_limits(model: mujoco.MjModel, ids: Indices) -> tuple[Array, Array]:
     return low, high
 
 
-_RANK = 1e-9
-"""Relative size below which a direction counts as out of the motors' reach."""
+_RANK = 1e-9  # relative size below which a direction counts as out of the motors' reach
 _TINY = 1e-12
 
 
@@ -270,19 +269,13 @@ def _compute_braking(motors: Motors, gains: Array) -> float:
     return 0.5 * float(np.min(reach, initial=np.inf))
 
 
-DRIVING_RATE = 4.0
-"""Wanted speed by distance (1/s)."""
-TURNING_RATE = 5.0
-"""Wanted turning speed by angle (1/s)."""
-FASTEST_TURN = 2.5
-"""rad/s."""
-WHEEL_RATE = 25.0
-"""How fast a wheel's speed follows (1/s)."""
-_KEPT = 0.2
-"""Cosine up to which the direction of driving, forwards or backwards, is kept."""
+DRIVING_RATE = 4.0  # wanted speed by distance (1/s)
+TURNING_RATE = 5.0  # wanted turning speed by angle (1/s)
+FASTEST_TURN = 2.5  # rad/s
+WHEEL_RATE = 25.0  # how fast a wheel's speed follows (1/s)
+_KEPT = 0.2  # cosine up to which the direction of driving, forwards or backwards, is kept
 _PARALLEL = 1e-3
-_SHARE_OF_GRIP = 0.25
-"""Acceleration that braking counts on, as a share of gravity's."""
+_SHARE_OF_GRIP = 0.25  # acceleration that braking counts on, as a share of gravity's
 _ROUND = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
     for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "MESH")

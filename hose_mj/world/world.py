@@ -42,8 +42,7 @@ class World(ABC):
         robot_forces: what `apply_force` has set, (N, 3), N.
     """
 
-    hose_model: str
-    """Name of the hose's model."""
+    hose_model: str  # name of the hose's model
 
     def __init__(self, scene: Scene, model: mujoco.MjModel) -> None:
         self.scene, self.model, self.data = scene, model, mujoco.MjData(model)

@@ -20,8 +20,7 @@ from hose_mj.recording.plots.style import SOFT, encode_png, make_figure
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
-IDLE = -1
-"""The turn of an agent that is not acting."""
+IDLE = -1  # the turn of an agent that is not acting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -332,8 +331,7 @@ def _compute_noise(settings: ConsensusSettings, second: Floats) -> Floats:
 
 SETTLING_TURNS, MEASURED_TURNS = 10, 40
 """Turns after which clocks that run alone have agreed, and turns measured from then on."""
-SHOWN_TURNS = 1.0
-"""Time during which the agreement is shown, in turns."""
+SHOWN_TURNS = 1.0  # time during which the agreement is shown, in turns
 SHOWN_ACTIONS = 16
 
 

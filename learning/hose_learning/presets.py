@@ -14,8 +14,7 @@ for all rewards that sees the whole state."""
 VETOES = ("none", "modules", "monolithic", "thresholds", "values")
 """No vetoes; a boolean module for each constraint (section 5.3); one on the whole state; a value
 module for each with a threshold (section 4.5); such modules without a threshold (Algorithm 4.1)."""
-VETO_THRESHOLD = -10.0
-"""v_t of section 4.6."""
+VETO_THRESHOLD = -10.0  # v_t of section 4.6
 
 
 @dataclass(frozen=True)

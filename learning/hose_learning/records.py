@@ -19,8 +19,7 @@ MOVES, EPISODES, SUCCESSES, FRESH = 0, 1, 2, 3
 """Places in `Memory.counters`: moves of single agents, episodes ended, those with success, and
 whether the state has to be reset before the next move."""
 N_COUNTERS = 4
-N_LOGGED = 2
-"""Logged of an episode: its moves, and the events that it ended with."""
+N_LOGGED = 2  # logged of an episode: its moves, and the events that it ended with
 
 
 class Learner(NamedTuple):

@@ -15,11 +15,9 @@ from hose_mj.tasks.kernels import Integers
 
 LARGEST_DENSE = 2**21
 """Most rows of a dense table; above that, visited rows side by side beat rows in their places."""
-DENSE_WIDTH = 8
-"""Longest rows of which there may be so many; of longer ones there may be fewer."""
+DENSE_WIDTH = 8  # longest rows of which there may be so many; of longer ones there may be fewer
 FIRST_CAPACITY = 2**14
-SLOTS_PER_KEY = 2
-"""Slots for each key at least; with fewer the probes grow long."""
+SLOTS_PER_KEY = 2  # slots for each key at least; with fewer the probes grow long
 _FREE = 0
 
 

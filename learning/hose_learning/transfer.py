@@ -28,8 +28,7 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-LARGEST = 2**24
-"""Most rows that a table may be given."""
+LARGEST = 2**24  # most rows that a table may be given
 
 
 @dataclass(frozen=True)
@@ -206,8 +205,7 @@ def list_written(table: Table) -> tuple[Integers, Integers]:
 
 
 LEARNER = "d-rr-ql"
-PER_SUCCESS = 0.001
-"""What epsilon falls by with each goal reached on the source (section 4.6.1)."""
+PER_SUCCESS = 0.001  # what epsilon falls by with each goal reached on the source (section 4.6.1)
 
 
 @dataclass(frozen=True, kw_only=True)

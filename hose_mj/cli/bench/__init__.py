@@ -36,12 +36,9 @@ class Args:
 
     group: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="{env,hose,learn,world}")]
     """What to measure."""
-    quick: bool = False
-    """Fewer and shorter rounds."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the actions and states."""
+    quick: bool = False  # Fewer and shorter rounds.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the actions and states.
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,8 @@ from hose_mj.recording.plots.style import (
     write_note,
 )
 
-HEIGHT = 0.38
-"""Room of an item over all its bars, in inches."""
-FILLED = 0.8
-"""Part of that room which the bars fill."""
+HEIGHT = 0.38  # room of an item over all its bars, in inches
+FILLED = 0.8  # part of that room which the bars fill
 
 
 @dataclass(frozen=True)

@@ -136,8 +136,7 @@ def _choose_looks(labels: Sequence[str]) -> dict[str, Look]:
     return looks
 
 
-PANEL = (4.6, 3.5)
-"""Width and height of a panel (inches)."""
+PANEL = (4.6, 3.5)  # width and height of a panel (inches)
 
 
 @dataclass(frozen=True)

@@ -41,10 +41,8 @@ from hose_mj.recording.plots.style import (
     write_note,
 )
 
-OVERVIEW = (1600 / 150, 700 / 150)
-"""Size of the overview (inches)."""
-_SHIFT = 6.0
-"""Distance of an arrow from its level (points of length)."""
+OVERVIEW = (1600 / 150, 700 / 150)  # size of the overview (inches)
+_SHIFT = 6.0  # distance of an arrow from its level (points of length)
 
 
 @dataclass(frozen=True)

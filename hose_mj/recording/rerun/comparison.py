@@ -27,11 +27,9 @@ from hose_mj.recording.rerun.parts import (
 )
 
 _UNITLESS = "number"
-_ASPECT = 1.4
-"""Width over height that a view is assumed to have."""
+_ASPECT = 1.4  # width over height that a view is assumed to have
 _THINNER = 0.55
-_FLAT = 1e-2
-"""A scene is planar if it is this much thinner than it is large."""
+_FLAT = 1e-2  # a scene is planar if it is this much thinner than it is large
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,8 @@ from hose_mj.recording.scene_description import SceneDescription
 from hose_mj.recording.sinks import Background, Sink
 from hose_mj.recording.world_episode import EpisodeEnding, Samples, WorldEpisode
 
-_STRETCH_S = 30.0
-"""How long a viewer may take for one stretch before the rest is kept from it (s)."""
-_START_S = 20.0
-"""How long a viewer may take to start (s)."""
+_STRETCH_S = 30.0  # how long a viewer may take for one stretch before the rest is kept from it (s)
+_START_S = 20.0  # how long a viewer may take to start (s)
 
 
 def write_world_recording(

@@ -16,13 +16,10 @@ from hose_mj.recording.palette import Rgb
 APPLICATION_ID = "hose_mj"
 TIMELINE = "sim_time"
 TURNS = "turn"
-OUTCOME = "outcome"
-"""Begins the names of the properties that say how episodes ended."""
+OUTCOME = "outcome"  # begins the names of the properties that say how episodes ended
 FACTS = ("ended_by", "break_kind", "break_time", "break_text")
-DARK = (17, 20, 24)
-"""Ground colour of the spatial views."""
-HALF_VIEW = float(np.tan(np.radians(27.5)))
-"""The viewer's vertical field of view is 55 degrees."""
+DARK = (17, 20, 24)  # ground colour of the spatial views
+HALF_VIEW = float(np.tan(np.radians(27.5)))  # the viewer's vertical field of view is 55 degrees
 _QUANTITIES = {
     "m": "Distance",
     "mm": "Distance",

@@ -30,8 +30,7 @@ TINTS: tuple[Rgb, ...] = ((255, 255, 255), (0, 190, 170), (225, 110, 200), (110,
 """Colours of the overlaid episodes from the second on: none is near one of the tension."""
 BOUNDS_COLOR = (150, 165, 185)
 CELL_COLOR = (120, 132, 148)
-_LONGEST_ARROW = 0.3
-"""Largest length of an arrow over the scene's size: longer ones are cut."""
+_LONGEST_ARROW = 0.3  # largest length of an arrow over the scene's size: longer ones are cut
 _PLANE_THICKNESS = 0.004
 """Thickness, over the scene's size, of the thin box whose top stands for a plane."""
 _LOOKS = {True: (0.25, -0.8, 0.95), False: (0.45, -1.0, 0.5)}

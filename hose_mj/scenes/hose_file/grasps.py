@@ -9,12 +9,9 @@ from hose_mj.toml_table import TomlTable
 
 Vector = tuple[float, float, float]
 PROFILES = ("smooth", "linear")
-FARTHEST = 1e5
-"""Positions are within this distance of the origin along each axis (m)."""
-LONGEST = 3600.0
-"""Movements end by then (s)."""
-_APART = 1e-6
-"""Holds are at least this fraction of the length apart."""
+FARTHEST = 1e5  # positions are within this distance of the origin along each axis (m)
+LONGEST = 3600.0  # movements end by then (s)
+_APART = 1e-6  # holds are at least this fraction of the length apart
 
 
 @dataclass(frozen=True)

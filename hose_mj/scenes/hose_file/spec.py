@@ -5,8 +5,7 @@ from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_c
 from hose_mj.hoses.spec import Fitting, HoseSpec, complete_section
 from hose_mj.toml_table import TomlTable
 
-LENGTHS = (1e-3, 1e4)
-"""A hose is at least and at most so long (m)."""
+LENGTHS = (1e-3, 1e4)  # a hose is at least and at most so long (m)
 _MAY_BE_NEGATIVE = ("rest_strain", "rest_curvature", "rest_torsion")
 _MAY_BE_ZERO = (
     *("poisson_ratio", "inner_diameter", "contents_density", "damping_time", "drag"),
@@ -20,8 +19,7 @@ _NEEDED = (
     ("outer_radius", "m, or outer_diameter"),
 )
 """What a hose must have in the end, and how a user gives it."""
-_SLENDER = 0.25
-"""The radius is at most this fraction of the length."""
+_SLENDER = 0.25  # the radius is at most this fraction of the length
 
 
 def read_spec(table: TomlTable) -> HoseSpec:

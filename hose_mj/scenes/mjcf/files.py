@@ -15,21 +15,14 @@ from xml.parsers import expat
 
 from hose_mj.errors import InputError
 
-LARGEST_XML = 1_000_000
-"""Bytes of one XML file."""
-LARGEST_ASSET = 20_000_000
-"""Bytes of one mesh, texture or other asset."""
-LARGEST_SCENE = 64_000_000
-"""Bytes of all files together."""
+LARGEST_XML = 1_000_000  # bytes of one XML file
+LARGEST_ASSET = 20_000_000  # bytes of one mesh, texture or other asset
+LARGEST_SCENE = 64_000_000  # bytes of all files together
 MOST_FILES = 200
-MOST_FOLDERS = 8
-"""Folders of assets."""
-MOST_NAMED = 1000
-"""Elements that name a file."""
-MOST_ELEMENTS = 20_000
-"""In all XML files together."""
-DEEPEST = 64
-"""Elements within each other."""
+MOST_FOLDERS = 8  # folders of assets
+MOST_NAMED = 1000  # elements that name a file
+MOST_ELEMENTS = 20_000  # in all XML files together
+DEEPEST = 64  # elements within each other
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
 _XML = ("include", "model")
 _SHOWN = 80

@@ -28,8 +28,7 @@ __all__ = ["Place", "Robot", "Scene", "find_scene", "list_scenes", "read_scene"]
 SITE = "site"
 SOURCE = "hose_source"
 ATTACH = "hose_attach"
-ORDER = "hose_robots"
-"""Name of the tuple of sites that gives the robots' order, where names do not."""
+ORDER = "hose_robots"  # name of the tuple of sites that gives the robots' order, where names do not
 _SEPARATORS = "/_.-"
 _NUMBER = re.compile(r"\d{1,6}(?=\D*\Z)", re.ASCII)
 GOAL = "goal"

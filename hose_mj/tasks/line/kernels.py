@@ -17,8 +17,7 @@ from hose_mj.tasks.stream import Stream, draw_below
 OUT, STRETCH, COLLISION, GOAL, ALL_GOALS = 1, 2, 4, 8, 16
 ENTERING, SWEEPING, ROBOTS = 0, 1, 2
 """Collision rules: entering a held or covered cell, any robot being on one, robots alone."""
-FIXED, RANDOM, ABSENT = 0, 1, 2
-"""Where the goal comes from."""
+FIXED, RANDOM, ABSENT = 0, 1, 2  # where the goal comes from
 
 
 class Line(NamedTuple):

@@ -50,24 +50,17 @@ from hose_mj.validation.user_hose.case import (
 
 KNOWN_MODELS = ("geds", "cable", "flex")
 """Models that a user's hose is compared with, those of them that there are."""
-REFERENCE_STEP = 2e-3
-"""The first reference takes steps of about this length (s)."""
-MOST_REFERENCE_POINTS = 192
-"""Times `compute_fineness`."""
+REFERENCE_STEP = 2e-3  # the first reference takes steps of about this length (s)
+MOST_REFERENCE_POINTS = 192  # times `compute_fineness`
 _TIGHTER = 5.0
 """A reference is to be this many times closer to its limit than the smallest wanted error."""
 _SHARE_OF_REFERENCE, _SHARE_OF_RUN = 0.3, 0.08
 """Of the budget: for the references, and for a single run."""
-_GROWTH = 8.0
-"""A rest shape takes a chain of twice as many segments about so many times as long."""
-_EXTRA = 0.1
-"""Of the budget: what timing may take beyond it."""
-_ENOUGH = 2
-"""Resolutions within the smallest wanted error, after which finer ones are left out."""
-FEWEST_SEGMENTS = 10
-"""The coarsest chain that is run."""
-_SOME_SPIN = 1e-3
-"""A spin that tells whether a model's clamps turn (rad)."""
+_GROWTH = 8.0  # a rest shape takes a chain of twice as many segments about so many times as long
+_EXTRA = 0.1  # of the budget: what timing may take beyond it
+_ENOUGH = 2  # resolutions within the smallest wanted error, after which finer ones are left out
+FEWEST_SEGMENTS = 10  # the coarsest chain that is run
+_SOME_SPIN = 1e-3  # a spin that tells whether a model's clamps turn (rad)
 GRID = Grid(
     static={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40), "flex": (10, 20, 40)},
     dynamic={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40, 80), "flex": (10, 20, 40, 80)},

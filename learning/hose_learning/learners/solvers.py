@@ -22,10 +22,8 @@ from hose_mj.tasks.stream import Stream
 
 ELIMINATION, ASCENT, MAX_PLUS = 0, 1, 2
 SOLVERS = {"variable-elimination": ELIMINATION, "coordinate-ascent": ASCENT, "max-plus": MAX_PLUS}
-MOST_SWEEPS = 1000
-"""An ascent ends much earlier; but rounding could let it go round in circles."""
-LARGEST_ELIMINATION = 10**6
-"""Most numbers that variable elimination may write down."""
+MOST_SWEEPS = 1000  # an ascent ends much earlier; but rounding could let it go round in circles
+LARGEST_ELIMINATION = 10**6  # most numbers that variable elimination may write down
 
 
 class Graph(NamedTuple):

@@ -31,8 +31,7 @@ from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.stream import Stream, draw_below, draw_unit
 from hose_mj.tasks.task import Task
 
-LARGEST_WIDTH = 1024
-"""Most joint actions."""
+LARGEST_WIDTH = 1024  # most joint actions
 
 
 class Team(NamedTuple):

@@ -24,8 +24,7 @@ from hose_mj.tasks.task import Task
 
 State = tuple[int, ...]
 """A task's state, its step count left out; it is nobody's turn (-1) in a terminal one."""
-Message = Mapping[State, float]
-"""Probability of each state, <s^j, P^_j>."""
+Message = Mapping[State, float]  # probability of each state, <s^j, P^_j>
 Evaluate = Callable[[int, State], Mapping[int, float]]
 """Q^i(s, .) of an agent, for the actions that it may take."""
 NOBODY = -1

@@ -15,8 +15,7 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-ABSENT = -1
-"""The projection of a target state that the source does not have."""
+ABSENT = -1  # the projection of a target state that the source does not have
 PROPERTIES = {
     1: "each target state projects onto a source state",
     2: "the transition probabilities are kept",

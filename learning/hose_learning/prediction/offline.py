@@ -19,8 +19,7 @@ from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.registry import make_task
 
-MARGIN = 0.001
-"""The tables round their numbers (to 0.01 %), and average them over folds."""
+MARGIN = 0.001  # the tables round their numbers (to 0.01 %), and average them over folds
 
 
 @dataclass(frozen=True)
@@ -76,11 +75,9 @@ def _make_row(per_cent: dict[str, float]) -> Published:
     return Published(measures, not is_between)
 
 
-Scores = dict[str, cross_validation.Score]
-"""By the names of `MEASURES`."""
+Scores = dict[str, cross_validation.Score]  # by the names of `MEASURES`
 
-LIFTED = 10**9
-"""A step limit that no log reaches."""
+LIFTED = 10**9  # a step limit that no log reaches
 COMPARED = ("1-nn", "naive-bayes", "random-forest", "c4.5")
 """Whose accuracy is held against the table: they hardly depend on settings that it leaves open."""
 CONFIDENCE = 0.99

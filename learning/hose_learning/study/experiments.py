@@ -170,8 +170,7 @@ _TEAMS: dict[str, tuple[str, dict[str, Any]]] = {
 """Goal modules that see their agent's cell and neighbours learn more than those that see everybody,
 and D-QL more where it keeps its policy."""
 HELD = "d-rr-ql"
-N_PEER_SEEDS = 3
-"""Seeds of what is only reported beside it: these runs take most of the time."""
+N_PEER_SEEDS = 3  # seeds of what is only reported beside it: these runs take most of the time
 
 
 def make_configuration(number: int) -> dict[str, Any]:

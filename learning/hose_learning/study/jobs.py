@@ -75,8 +75,7 @@ def measure(
     return Measures(n_g, n_f, s_f, s_b, training.moves // per_step, n_tests, n_valid)
 
 
-VERSION = 1
-"""Raised when the same job would give something else than before."""
+VERSION = 1  # raised when the same job would give something else than before
 Result = dict[str, Any]
 
 

@@ -17,8 +17,7 @@ from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.task import Task
 
 LOG_CAPACITY = 2**14
-CHUNK = {True: 2**18, False: 2**9}
-"""Moves between two looks at the clock, compiled and not."""
+CHUNK = {True: 2**18, False: 2**9}  # moves between two looks at the clock, compiled and not
 Manner = Literal["turns", "joint", "composed"]
 
 

@@ -19,11 +19,7 @@ _SHOWN = 80
 
 
 def read_toml(path: Path) -> TomlTable:
-    """Reads a TOML file.
-
-    Raises:
-        InputError: a file that cannot be read or is not TOML.
-    """
+    """Reads a TOML file; `InputError` for a file that cannot be read or is not TOML."""
     try:
         with open(path, "rb") as stream:
             data = stream.read(LARGEST_FILE + 1)

@@ -42,10 +42,8 @@ CASES: tuple[Case, ...] = (
 def list_plugin_cases() -> tuple[Case, ...]:
     """Returns the cases of other packages: what their entry points in `hose_mj.cases` name.
 
-    An entry point is a `Case`, or a callable without arguments that returns some.
-
-    Raises:
-        InputError: an entry point that cannot be imported or is neither, or an id that is taken.
+    An entry point is a `Case`, or a callable without arguments that returns some. `InputError` is
+    raised for an entry point that cannot be imported or is neither, or an id that is taken.
     """
     cases: list[Case] = []
     for name, entry in find_plugins("hose_mj.cases").items():
@@ -67,9 +65,7 @@ def find_cases(ids: tuple[str, ...]) -> tuple[Case, ...]:
     """Returns the cases of these ids, in the order of `CASES`; a family's name selects all of it.
 
     Without ids all of `CASES`; those of other packages (`list_plugin_cases`) run when asked for.
-
-    Raises:
-        InputError: an id that is neither a case nor a family.
+    `InputError` is raised for an id that is neither a case nor a family.
     """
     if not ids:
         return CASES

@@ -64,10 +64,8 @@ class Motors:
 def find_motors(world: World) -> list[Motors]:
     """Returns the motors of each robot, the tip's first.
 
-    A motor is a robot's when it pulls at a joint of the robot's bodies.
-
-    Raises:
-        InputError: an actuator of a robot that is no motor.
+    A motor is a robot's when it pulls at a joint of the robot's bodies. `InputError` is raised for
+    an actuator of a robot that is no motor.
     """
     model = world.model
     data = mujoco.MjData(model)

@@ -25,11 +25,7 @@ IDLE = -1  # the turn of an agent that is not acting
 
 @dataclass(frozen=True, kw_only=True)
 class ConsensusSettings:
-    """A network of clocks.
-
-    Raises:
-        InputError: a value outside its range.
-    """
+    """A network of clocks; `InputError` for a value outside its range."""
 
     n_agents: int = 4  # N
     loss: float = 0.1  # probability that a message is lost, each on its own
@@ -71,15 +67,11 @@ def _check_between(name: str, value: float, low: float, high: float, whole: bool
 
 
 class Messages(NamedTuple):
-    """What arrives in one round.
+    """What arrives in one round."""
 
-    Attributes:
-        heard: whether agent i gets a message of agent j (N, N); none from itself.
-        ages: rounds since agent j sent it (N, N).
-    """
-
+    # Whether agent i gets a message of agent j (N, N); none from itself.
     heard: npt.NDArray[np.bool_]
-    ages: Integers
+    ages: Integers  # rounds since agent j sent it (N, N)
 
 
 class Action(NamedTuple):

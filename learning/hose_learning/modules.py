@@ -22,11 +22,7 @@ Credit = Literal["cycle", "own"]
 
 @dataclass(frozen=True, kw_only=True)
 class Module:
-    """What one module sees and learns from.
-
-    Raises:
-        InputError: an unknown kind or credit.
-    """
+    """What one module sees and learns from; `InputError` for an unknown kind or credit."""
 
     name: str  # for messages and listings
     variables: tuple[str, ...]  # names of the task's variables; none at all is a single state

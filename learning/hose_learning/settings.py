@@ -39,11 +39,7 @@ class Exploration:
 
 @dataclass(frozen=True, kw_only=True)
 class LearnerSettings:
-    """A learner as data.
-
-    Raises:
-        InputError: a value outside its range.
-    """
+    """A learner as data; `InputError` for a value outside its range."""
 
     modules: tuple[Module, ...]  # what it sees and learns from; at least one value module
     discount: float = 0.9  # gamma

@@ -210,25 +210,19 @@ PER_SUCCESS = 0.001  # what epsilon falls by with each goal reached on the sourc
 
 @dataclass(frozen=True, kw_only=True)
 class TransferPlan:
-    """What to run.
+    """What to run."""
 
-    Attributes:
-        source, target: ids of the tasks.
-        source_options, target_options: their options.
-        moves: of training on the source.
-        episodes: greedy learning episodes on the target.
-        exchange: what a move on the target costs, in moves on the source; a control for each.
-        values: what the goal modules see (`hose_learning.presets.VALUES`).
-    """
-
+    # source, target: ids of the tasks.
     source: str
     target: str
+    # source_options, target_options: their options.
     source_options: Mapping[str, Any]
     target_options: Mapping[str, Any]
-    moves: int
-    episodes: int
+    moves: int  # of training on the source
+    episodes: int  # greedy learning episodes on the target
+    # What a move on the target costs, in moves on the source; a control for each.
     exchange: tuple[float, ...]
-    values: str = "goal"
+    values: str = "goal"  # what the goal modules see (`hose_learning.presets.VALUES`)
 
 
 @dataclass(frozen=True)

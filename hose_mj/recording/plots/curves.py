@@ -163,9 +163,7 @@ def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:
     """Draws panels side by side; each line's name stands at its end, in the last panel.
 
     Each line has dashes of its own, so that one shows through another that lies over it.
-
-    Raises:
-        InputError: no panel, one without curves, or arrays of different lengths.
+    `InputError` is raised for no panel, one without curves, or arrays of different lengths.
     """
     check_some("panels", panels)
     labels = list(dict.fromkeys(label for panel in panels for label in panel.curves))

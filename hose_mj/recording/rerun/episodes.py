@@ -155,11 +155,7 @@ class LiveView:
         self._url, self._id, self._wait = url, recording_id, wait_s
 
     def begin(self, scene: SceneDescription) -> None:
-        """Connects and shows the scene.
-
-        Raises:
-            HoseError: nobody listens.
-        """
+        """Connects and shows the scene; `HoseError` where nobody listens."""
         place, deadline = check_url(self._url), time.monotonic() + self._wait
         wait_until(lambda: is_listening(*place), deadline, f"no viewer listens at {self._url}")
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)

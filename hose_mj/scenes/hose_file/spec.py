@@ -27,10 +27,8 @@ def read_spec(table: TomlTable) -> HoseSpec:
 
     A ready hose (`like`) and a material (`material`) give numbers first; the numbers that stand in
     the table replace them. Diameters and a material make the stiffnesses and the linear density;
-    those that are stated replace what was made.
-
-    Raises:
-        InputError: an unknown key or name, a number out of range, or too few of them.
+    those that are stated replace what was made. `InputError` is raised for an unknown key or name,
+    a number out of range, or too few of them.
     """
     length = table.number("length", least=LENGTHS[0], most=LENGTHS[1])
     given = _gather(table)

@@ -30,22 +30,16 @@ _SHOWN = 80
 
 @dataclass
 class SceneFiles:
-    """What a scene consists of; filled by `read_files`.
+    """What a scene consists of; filled by `read_files`."""
 
-    Attributes:
-        path: the scene's file, without symbolic links.
-        contents: SHA-256 of each file read, by its path.
-        n_bytes: sizes added up.
-        n_elements: XML elements met.
-        folders: folders in which assets are looked for, relative to the scene's.
-        wanted: what elements name: (where, XML or asset, value, file that names it).
-    """
-
-    path: Path
+    path: Path  # the scene's file, without symbolic links
+    # SHA-256 of each file read, by its path.
     contents: dict[Path, str] = field(default_factory=dict)
-    n_bytes: int = 0
-    n_elements: int = 0
+    n_bytes: int = 0  # sizes added up
+    n_elements: int = 0  # XML elements met
+    # Folders in which assets are looked for, relative to the scene's.
     folders: list[str] = field(default_factory=lambda: [""])
+    # What elements name: (where, XML or asset, value, file that names it).
     wanted: list[tuple[str, bool, str, Path]] = field(default_factory=list)
 
     @property

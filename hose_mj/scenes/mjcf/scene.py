@@ -232,12 +232,10 @@ def find_robots(
 
     The order is that of the sites in the tuple `hose_robots` where the scene has it. Otherwise each
     robot's number is the last number in the prefix of its site or, without one, in its body's name,
-    and the numbers are 0 to N - 1; a single robot needs none. Robot i holds the hose at
-    L (N - i) / N from the source, so that the segments are equal, or at the i-th of `attachments`.
-
-    Raises:
-        InputError: no robots, a robot that cannot move or has two sites, numbers that are not
-            0 to N - 1, attachments that do not fall from the tip to the source.
+    and the numbers are 0 to N - 1; a single robot needs none. Robot i holds the hose at L (N - i) /
+    N from the source, so that the segments are equal, or at the i-th of `attachments`. `InputError`
+    is raised for no robots, a robot that cannot move or has two sites, numbers that are not 0 to N
+    - 1, attachments that do not fall from the tip to the source.
     """
     found = {p.site: p for p in places if _split(p.site, ATTACH) is not None}
     if not found:

@@ -36,30 +36,21 @@ Schedule = Literal["turns", "joint"]
 
 @dataclass(frozen=True, kw_only=True)
 class LearnerEntry:
-    """Where a learner is and what it is.
+    """Where a learner is and what it is."""
 
-    Attributes:
-        module: where it is, imported when it is made.
-        factory: the function there that makes it.
-        schedule: whether its agents move in "turns" (or alone) or jointly.
-        section: where the thesis has it, or whose it is.
-        description: one line for listings.
-        values, vetoes: its modules by default, see `hose_learning.presets`.
-        settings: fields of `LearnerSettings` that differ from its defaults.
-        composes: whether its greedy policies are composed into joint moves (section 6.4).
-        refresh_moves: moves after which its module's `refresh` is called, in plain Python; 0 for
-            never.
-    """
-
-    module: str
-    section: str
-    description: str
-    schedule: Schedule = "turns"
-    factory: str = "make"
+    module: str  # where it is, imported when it is made
+    section: str  # where the thesis has it, or whose it is
+    description: str  # one line for listings
+    schedule: Schedule = "turns"  # whether its agents move in "turns" (or alone) or jointly
+    factory: str = "make"  # the function there that makes it
+    # values, vetoes: its modules by default, see `hose_learning.presets`.
     values: str = "goal"
     vetoes: str = "none"
+    # Fields of `LearnerSettings` that differ from its defaults.
     settings: Mapping[str, Any] = field(default_factory=dict)
+    # Whether its greedy policies are composed into joint moves (section 6.4).
     composes: bool = False
+    # Moves after which its module's `refresh` is called, in plain Python; 0 for never.
     refresh_moves: int = 0
 
 

@@ -33,14 +33,10 @@ AVERAGED_EPISODES = 100
 
 
 class Risk(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discounts: gamma^k for the goal, 1 for the risk (2, n_agents + 1).
-        risk_bound, xi_step, xi_most, settle_episodes: see `OPTIONS`.
-    """
-
-    discounts: Floats
+    discounts: Floats  # gamma^k for the goal, 1 for the risk (2, n_agents + 1)
+    # risk_bound, xi_step, xi_most, settle_episodes: see `OPTIONS`.
     risk_bound: float
     xi_step: float
     xi_most: float

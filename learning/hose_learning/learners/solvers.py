@@ -143,23 +143,18 @@ def _list_inputs(order: Sequence[int], scopes: Sequence[tuple[int, ...]]) -> Int
 
 
 class Scratch(NamedTuple):
-    """Work arrays.
+    """Work arrays."""
 
-    Attributes:
-        values: of all functions of the graph, one after the other; the edges' payoffs first.
-        messages: of each edge, from either end, about the other's actions (n_edges, 2, n_actions).
-        scores, replies: of one agent's actions (n_actions,).
-        trial, best: joint actions (n_agents,).
-        errors: TD error of each agent (n_agents,).
-    """
-
-    values: Floats
+    values: Floats  # of all functions of the graph, one after the other; the edges' payoffs first
+    # Of each edge, from either end, about the other's actions (n_edges, 2, n_actions).
     messages: Floats
+    # scores, replies: of one agent's actions (n_actions,).
     scores: Floats
     replies: Floats
+    # trial, best: joint actions (n_agents,).
     trial: Integers
     best: Integers
-    errors: Floats
+    errors: Floats  # TD error of each agent (n_agents,)
 
 
 def make_scratch(graph: Graph, n_actions: int) -> Scratch:

@@ -137,10 +137,8 @@ def describe_state(task: Task, state: Integers, events: int = 0) -> str:
 def solve(model: MarkovModel, discount: float, tolerance: float = 1e-12) -> Floats:
     """Returns Q*(s, a) by value iteration (n_states, n_actions); 0 in terminal states.
 
-    Q*(s, a) = sum_s' P(s, a, s') [R(s') + gamma max_a' Q*(s', a')].
-
-    Raises:
-        InputError: a discount outside [0, 1).
+    Q*(s, a) = sum_s' P(s, a, s') [R(s') + gamma max_a' Q*(s', a')]. `InputError` is raised for a
+    discount outside [0, 1).
     """
     _check_discount(discount)
     q_values = np.zeros((model.n_states, model.n_actions))

@@ -153,20 +153,15 @@ def describe_move(model: MarkovModel, state: int, action: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Propositions:
-    """What chapter 7 concludes, measured on one pair of tasks, in the target's n states.
+    """What chapter 7 concludes, measured on one pair of tasks, in the target's n states."""
 
-    Attributes:
-        unsafe_in_source: actions that are safe in the target and not in the source; Proposition 4
-            says that there are none.
-        bounds: max_a Q_s*([s], a) (n,).
-        best: V_t*(s) (n,).
-        greedy: V of the greedy policy among the target's safe actions, transferred by equations 7.1
-            and 7.2 (n,).
-    """
-
+    # Actions that are safe in the target and not in the source; Proposition 4 says that there are
+    # none.
     unsafe_in_source: int
-    bounds: Floats
-    best: Floats
+    bounds: Floats  # max_a Q_s*([s], a) (n,)
+    best: Floats  # V_t*(s) (n,)
+    # V of the greedy policy among the target's safe actions, transferred by equations 7.1 and 7.2
+    # (n,).
     greedy: Floats
 
     @property

@@ -85,11 +85,7 @@ CONFIDENCE = 0.99
 
 @dataclass(frozen=True, kw_only=True)
 class OfflinePlan:
-    """What is to be measured.
-
-    Raises:
-        InputError: fewer than one cycle or log, or a negative seed.
-    """
+    """What is to be measured; `InputError` for fewer than one cycle or log, or a negative seed."""
 
     task: str = "taxi"  # id of the task
     cycles: int = 2002  # moves of each agent in a log

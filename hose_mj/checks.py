@@ -7,13 +7,8 @@ from typing import Any
 
 from hose_mj.errors import InputError
 
-_COMPARISONS = {
-    "<=": operator.le,
-    "<": operator.lt,
-    ">=": operator.ge,
-    ">": operator.gt,
-    "==": operator.eq,
-}
+_COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
+_COMPARISONS |= {"==": operator.eq}
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol, TextIO
+from typing import Any, Protocol
 
 from hose_mj import version
 from hose_mj.errors import InputError
@@ -68,9 +68,9 @@ def make_document(
     return document
 
 
-def print_document(document: Mapping[str, Any], stream: TextIO | None = None) -> None:
-    """Prints a document on stdout, or on another stream; see `format_document`."""
-    print(format_document(document), file=stream or sys.stdout, flush=True)
+def print_document(document: Mapping[str, Any]) -> None:
+    """Prints a document on stdout; see `format_document`."""
+    print(format_document(document), file=sys.stdout, flush=True)
 
 
 def format_document(document: Mapping[str, Any]) -> str:

@@ -125,16 +125,6 @@ def _enumerate(
     )
 
 
-def discount_cycles(model: Model, discount: float) -> Floats:
-    """Returns the discount of each state's moves when only a full cycle of turns is discounted.
-
-    It is 1 within a cycle and `discount` for the move that hands the turn back to agent 0 (the
-    cycle's rewards are then summed without discount, as Algorithm 4.1 does for agent 0).
-    """
-    last = model.states[:, TURN].max()
-    return np.where(model.turns == last, discount, 1.0)
-
-
 def solve(
     model: Model, rewards: npt.ArrayLike, discount: npt.ArrayLike, tolerance: float = 1e-12
 ) -> Floats:

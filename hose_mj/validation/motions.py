@@ -214,14 +214,7 @@ def compute_tow_place(fraction: Array) -> Array:
     return np.asarray(_make_eight()(fraction))
 
 
-def tow_chain(
-    spec: HoseSpec,
-    friction: float,
-    start: Array,
-    path: Array,
-    delta: float,
-    gravity: float = GRAVITY,
-) -> Array:
+def tow_chain(spec: HoseSpec, friction: float, start: Array, path: Array, delta: float) -> Array:
     """Tows a chain by its last node.
 
     Args:
@@ -230,7 +223,6 @@ def tow_chain(
         start: nodes (N + 1, 2) of the chain at rest, evenly spaced along it, m.
         path: places of the last node, one an increment, (k, 2), m.
         delta: slip below which friction is smoothed (m), well below an increment.
-        gravity: m/s^2.
 
     Returns:
         nodes after each increment, (k, N + 1, 2), m.
@@ -240,7 +232,7 @@ def tow_chain(
     """
     n = len(start)
     h = spec.length / (n - 1)
-    drag = friction * spec.linear_density * gravity
+    drag = friction * spec.linear_density * GRAVITY
     chain = Chain(h, spec.axial_stiffness, spec.bending_stiffness, drag, delta, 1e-3 * delta)
     x = np.array(start, dtype=np.float64).ravel()
     padded = 2 * n + WIDTH

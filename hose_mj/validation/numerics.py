@@ -257,7 +257,7 @@ def _compute_spin(tangent: Array, director: Array, angle: float) -> tuple[Array,
     return ahead, wanted, spin
 
 
-def precess(form: str, n_turns: int, steps_a_turn: int = 36) -> Iterator[GedsHose]:
+def precess(form: str, n_turns: int) -> Iterator[GedsHose]:
     """Turns a bent, twisted rod about the axis of its first clamp as if it were rigid.
 
     Yields the hose at equilibrium before it begins, then after every turn.
@@ -275,9 +275,9 @@ def precess(form: str, n_turns: int, steps_a_turn: int = 36) -> Iterator[GedsHos
     yield hose
     place, tangent = hose.position(LENGTH)[0], hose.tangent(LENGTH)[0]
     director = np.cross(tangent, [0.0, 0.0, 1.0])
-    angle = 2.0 * math.pi / steps_a_turn
+    angle = 2.0 * math.pi / 36
     for _ in range(n_turns):
-        for _ in range(steps_a_turn):
+        for _ in range(36):
             place = _turn_about_x(place, angle)
             tangent, director, spin = _compute_spin(tangent, director, angle)
             hose.move(holds[0], spin=angle)

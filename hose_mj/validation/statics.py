@@ -198,9 +198,9 @@ def _check_spline(hose: HoseModel) -> GedsHose:
     return hose
 
 
-def spin_clamp(hose: HoseModel, hold: Hold, angle: float, most: float = LARGEST_SPIN) -> None:
+def spin_clamp(hose: HoseModel, hold: Hold, angle: float) -> None:
     """Spins a clamp by an angle (rad), equilibrium after equilibrium."""
-    n_parts = max(math.ceil(abs(angle) / most), 1)
+    n_parts = max(math.ceil(abs(angle) / LARGEST_SPIN), 1)
     for _ in range(n_parts):
         hose.move(hold, spin=angle / n_parts)
         hose.solve_static()

@@ -247,18 +247,6 @@ def compute_longest_action(lead: float, drift: float) -> float:
     return (1.0 - lead) / (1.0 + drift)
 
 
-def compute_contraction(n_agents: int, loss: float) -> float:
-    """Returns the factor by which a round shrinks the mean squared disagreement, without delay.
-
-    With q = 1 - p the share of messages that arrive and x_i the clocks about their mean, a round
-    leaves E[x_i'] = p x_i, and adds to each the variance p q / N^2 sum_j (x_i - x_j)^2. Summed up,
-    and less the variance of the mean, the sum of squares shrinks by
-
-        lambda = p^2 + 2 p q (N - 1) / N^2.
-    """
-    return loss**2 + 2.0 * loss * (1.0 - loss) * (n_agents - 1) / n_agents**2
-
-
 def compute_speed(settings: ConsensusSettings) -> float:
     """Returns how fast the agreed clock runs without drift, in turns per unit of time.
 
@@ -276,7 +264,7 @@ def compute_disagreement(settings: ConsensusSettings, rates: Floats, n_rounds: i
     with rates v_i (N,), agents that act left aside; it settles within some tens of rounds. Without
     delay the value is
 
-        sqrt((1 + p) / ((1 - p) (1 - lambda))) h std(v_i).
+        sqrt((1 + p) / ((1 - p) (1 - lambda))) h std(v_i), lambda = p^2 + 2 p (1 - p) (N - 1) / N^2.
     """
     n, kept = settings.n_agents, settings.delay + 1
     arrive = 1.0 - settings.loss

@@ -48,8 +48,7 @@ class Image:
         [s] = key of the source; its digits in mixed radix are the values of the shared variables.
         """
         digits = keys[:, None] // self.strides % self.cardinalities
-        mapped: Integers = (digits @ self.images)[:, None] + self.offsets
-        return mapped
+        return (digits @ self.images)[:, None] + self.offsets
 
 
 def make_image(source: Task, source_module: Module, target: Task, target_module: Module) -> Image:

@@ -90,7 +90,6 @@ def plot_series(
     ylabel: str,
     groups: Mapping[str, tuple[ArrayLike, ArrayLike]],
     limits: Mapping[str, float] | None = None,
-    logy: bool = False,
 ) -> bytes:
     """Draws numbers over time, lines named at their ends; `limits` go across with their names."""
     check_some("groups", groups)
@@ -99,7 +98,6 @@ def plot_series(
     with make_axes(title, (7.6, 3.3)) as (figure, axes):
         for rank, (label, (times, values)) in enumerate(groups.items()):
             t, y = check_pair(label, times, values)
-            y = np.where(y > 0.0, y, np.nan) if logy else y
             width = 1.3 + 1.1 * (len(groups) - 1 - rank) / max(len(groups) - 1, 1)
             axes.plot(t, y, color=looks[label].color, ls=looks[label].dashes, lw=width)
             seen = y[np.isfinite(y)]
@@ -108,8 +106,6 @@ def plot_series(
         for name, limit in (limits or {}).items():
             axes.axhline(limit, color=ink, lw=0.9, ls=(0, (4, 3)))
             ends.append((limit, name, ink))
-        if logy:
-            set_log(axes, x=False, y=True)
         every = np.concatenate([np.ravel(times) for times, _ in groups.values()])
         axes.set_xlim(float(every.min()), float(every.max()) or 1.0)
         axes.set_xlabel("time (s)")

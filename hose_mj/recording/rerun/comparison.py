@@ -51,8 +51,7 @@ class Framing:
     @property
     def eye_up(self) -> Array:
         """Returns the world axis that stays upright when the reader turns the view, (3,)."""
-        axis: Array = np.eye(3)[int(np.argmax(np.abs(self.up)))]
-        return axis
+        return np.asarray(np.eye(3)[int(np.argmax(np.abs(self.up)))])
 
     def clip_radii(self, scene: Scene) -> dict[str, float]:
         """Returns the radius that each track is drawn with (m), by name.

@@ -26,16 +26,13 @@ _STRETCH_S = 30.0  # how long a viewer may take for one stretch before the rest 
 _START_S = 20.0  # how long a viewer may take to start (s)
 
 
-def write_world_recording(
-    path: Path, episodes: Sequence[WorldEpisode], recording_id: str | None = None
-) -> None:
+def write_world_recording(path: Path, episodes: Sequence[WorldEpisode]) -> None:
     """Writes one .rrd of an episode, or of several overlaid in one scene; whole or not at all.
 
     Args:
         path: replaced if it exists.
         episodes: the first in its own colours, the others tinted and see-through; names of their
             scenes all different.
-        recording_id: tells recordings apart in the viewer; a new one by default.
 
     Raises:
         InputError: no episode, or two of one name.
@@ -44,7 +41,7 @@ def write_world_recording(
         raise InputError("episodes", episodes, "at least one")
     scenes = [episode.scene for episode in episodes]
     check_unique("episodes", [scene.name for scene in scenes])
-    stream, encode = open_stream(make_world_blueprint(scenes), recording_id)
+    stream, encode = open_stream(make_world_blueprint(scenes))
     log_settings(stream, scenes, [describe_ending(e.scene, e.ending) for e in episodes])
     log_scene(stream, scenes[0])
     for rank, episode in enumerate(episodes):

@@ -143,11 +143,6 @@ class UndesiredPredictor:
             labels.append(np.full(len(kept), label == UNDESIRED))
         return np.concatenate(values).astype(np.int64), np.concatenate(labels)
 
-    def predict(self, values: Integers, agent: int) -> Floats:
-        """Returns p(s, a) of all actions in what an agent sees (n_actions,)."""
-        actions = range(self.forest.trained.shape[1])
-        return np.array([predict_undesired(self.forest, values, agent, a) for a in actions])
-
     def veto_mask(self, values: Integers, agent: int) -> int:
         """Returns the actions to avoid in what an agent sees, as bits; they may be all."""
         return int(compute_veto_mask(self.forest, values, agent))

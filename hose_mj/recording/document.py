@@ -70,7 +70,8 @@ def make_document(
 
 def print_document(document: Mapping[str, Any]) -> None:
     """Prints a document on stdout; see `format_document`."""
-    print(format_document(document), file=sys.stdout, flush=True)
+    sys.stdout.write(f"{format_document(document)}\n")
+    sys.stdout.flush()
 
 
 def format_document(document: Mapping[str, Any]) -> str:

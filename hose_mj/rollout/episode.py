@@ -60,16 +60,13 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How an episode ended, with which break, if any, and how long it took, simulated (s).
-
-    `stalled` counts the actions that robots gave up.
-    """
+    """How an episode ended, with which break, if any, and how long it took, simulated (s)."""
 
     steps: int
     sim_time: float
     ended_by: EndedBy
     broken: Break | None
-    stalled: int
+    stalled: int  # actions that robots gave up
 
 
 def is_at_goal(world: World) -> bool:

@@ -362,14 +362,11 @@ PATIENCE = 1.5  # how much longer than its targets take a trial goes on, and a s
 
 @dataclass(frozen=True)
 class RehearsedScript:
-    """A script that was played, its first break, if any, and when it ended (s).
-
-    `at_goal` says whether the tip reached the goal before.
-    """
+    """A script that was played, its first break, if any, and when it ended (s)."""
 
     script: Script
     broken: Break | None
-    at_goal: bool
+    at_goal: bool  # whether the tip reached the goal before
     time: float
 
 

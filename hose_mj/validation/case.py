@@ -56,13 +56,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class Reference:
-    """The truth of a motion: probe values (k, q), and how far two resolutions of it still differ.
+    """The truth of a motion."""
 
-    `uncertainty` is a fraction of L.
-    """
-
-    values: Array
-    uncertainty: float
+    values: Array  # of the probe (k, q)
+    uncertainty: float  # how far two resolutions of it still differ, as a fraction of L
 
 
 @dataclass(frozen=True)

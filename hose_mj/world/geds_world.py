@@ -230,17 +230,13 @@ class GedsWorld(World):
 
 
 class _Iterate(NamedTuple):
-    """An iterate of the coupling: how near hose and bodies have come (m), with which forces (N).
+    """An iterate of the coupling of hose and bodies."""
 
-    `reached` is where the bodies' sites are at the end of the step (m); `aim` and `compliance`
-    are the linear answer of the bodies that the hose was solved for.
-    """
-
-    gap: float
-    forces: Array
-    reached: Array
-    aim: Array
-    compliance: Array
+    gap: float  # how near hose and bodies have come (m)
+    forces: Array  # with which (N)
+    reached: Array  # where the bodies' sites are at the end of the step (m)
+    aim: Array  # of the linear answer of the bodies that the hose was solved for
+    compliance: Array  # likewise
 
 
 _QUADRATIC = int(mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC)

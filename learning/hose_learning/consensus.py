@@ -85,15 +85,12 @@ class Action(NamedTuple):
 
 @dataclass(frozen=True)
 class Record:
-    """What a simulation saw: rates v_i (N,), turns per unit of time; clocks; actions as they began.
+    """What a simulation saw."""
 
-    `clocks` are xi_i at the beginning of each round (n_rounds, N), `round_time` apart.
-    """
-
-    rates: Floats
-    clocks: Floats
-    actions: tuple[Action, ...]
-    round_time: float
+    rates: Floats  # v_i (N,), turns per unit of time
+    clocks: Floats  # xi_i at the beginning of each round (n_rounds, N)
+    actions: tuple[Action, ...]  # as they began
+    round_time: float  # between two rounds
 
     @property
     def times(self) -> Floats:

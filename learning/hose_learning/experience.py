@@ -27,21 +27,16 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Experience:
-    """A log of n moves of a task, by its id; the arrays are those of `hose_learning.loop.Rows`.
+    """A log of n moves of a task; the arrays are those of `hose_learning.loop.Rows`."""
 
-    `variables` names the columns of `values`, each with a number of values (n_variables,), and
-    `reward_names` those of `rewards`; agents and actions are named by number, event k is bit k.
-    `violations` are the events that break a constraint, as bits.
-    """
-
-    task: str
-    variables: tuple[str, ...]
-    cardinalities: Integers
-    agent_names: tuple[str, ...]
+    task: str  # its id
+    variables: tuple[str, ...]  # the columns of `values`
+    cardinalities: Integers  # how many values each has (n_variables,)
+    agent_names: tuple[str, ...]  # by number, as those of the actions
     action_names: tuple[str, ...]
-    event_names: tuple[str, ...]
-    reward_names: tuple[str, ...]
-    violations: int
+    event_names: tuple[str, ...]  # event k is bit k
+    reward_names: tuple[str, ...]  # the columns of `rewards`
+    violations: int  # the events that break a constraint, as bits
     values: Integers
     agents: Integers
     actions: Integers

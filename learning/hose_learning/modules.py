@@ -43,17 +43,12 @@ class Module:
 
 @dataclass(frozen=True)
 class Arrays:
-    """What loops need of modules of one kind.
+    """What loops need of modules of one kind."""
 
-    A variable has a place among all and adds a stride to the key for each step, 0 where it pads
-    (n_modules, width); `bases` are the first key of each agent (n_modules, n_agents), `size` is the
-    number of keys.
-    """
-
-    columns: Integers
-    strides: Integers
-    bases: Integers
-    size: int
+    columns: Integers  # the variables' places among all (n_modules, width)
+    strides: Integers  # what a step of each adds to the key; 0 where it pads (n_modules, width)
+    bases: Integers  # the first key of each agent (n_modules, n_agents)
+    size: int  # number of keys
 
 
 def make_arrays(task: Task, modules: Sequence[Module], n_parts: int) -> Arrays:

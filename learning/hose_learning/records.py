@@ -86,14 +86,11 @@ class Memory(NamedTuple):
 
 
 class Log(NamedTuple):
-    """One row for each episode, filled from the front; `used` is the number of rows written (1,).
+    """One row for each episode, filled from the front."""
 
-    They are moves and last events (capacity, N_LOGGED), and sums of all rewards (capacity,).
-    """
-
-    used: Integers
-    episodes: Integers
-    returns: Floats
+    used: Integers  # number of rows written (1,)
+    episodes: Integers  # moves and last events (capacity, N_LOGGED)
+    returns: Floats  # sums of all rewards (capacity,)
 
 
 def make_log(capacity: int) -> Log:

@@ -89,16 +89,12 @@ def make_image(source: Task, source_module: Module, target: Task, target_module:
 
 @dataclass(frozen=True)
 class Match:
-    """A module that source and target have in common.
-
-    `table` is the field of the memory that holds its rows, `image` how its keys relate, `parts` the
-    first key of each agent in the source and in the target.
-    """
+    """A module that source and target have in common."""
 
     name: str
-    table: str
-    image: Image
-    parts: tuple[tuple[int, int], ...]
+    table: str  # field of the memory that holds its rows
+    image: Image  # how its keys relate
+    parts: tuple[tuple[int, int], ...]  # first key of each agent in source and target
 
 
 def transfer(source: Training, target: Training) -> tuple[str, ...]:

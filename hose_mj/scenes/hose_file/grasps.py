@@ -16,14 +16,11 @@ _APART = 1e-6  # holds are at least this fraction of the length apart
 
 @dataclass(frozen=True)
 class Timed:
-    """A change from `start` on (s), for `duration` (s).
+    """A change over time."""
 
-    Its profile is "smooth" (half a cosine: starts and ends at rest) or "linear".
-    """
-
-    start: float
-    duration: float
-    profile: str
+    start: float  # s
+    duration: float  # s
+    profile: str  # "smooth" (half a cosine: starts and ends at rest) or "linear"
 
     @property
     def end(self) -> float:

@@ -67,15 +67,11 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Composition:
-    """A joint move that agents agreed on: an action for each, in the order of their turns.
+    """A joint move that agents agreed on."""
 
-    `messages` are what each agent got, and at last what the cycle leads to; `value` is what eqs 6.5
-    and 6.6 expect of it, rewards that are not positive left out.
-    """
-
-    actions: tuple[int, ...]
-    messages: tuple[Message, ...]
-    value: float
+    actions: tuple[int, ...]  # one of each agent, in the order of their turns
+    messages: tuple[Message, ...]  # what each agent got, and at last what the cycle leads to
+    value: float  # what eqs 6.5 and 6.6 expect of it, rewards that are not positive left out
 
 
 def compose(

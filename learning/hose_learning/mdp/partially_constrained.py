@@ -212,18 +212,15 @@ def choose_greedy(q_values: Floats, allowed: np.ndarray) -> Integers:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two tasks by their ids and options, and the properties of Definition 11 that do not hold.
+    """Two tasks by their ids and options."""
 
-    `settings` are options of both tasks; `meaning` is a line about the pair.
-    """
-
-    meaning: str
+    meaning: str  # a line about the pair
     source: str
     target: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)  # of both
     source_settings: Mapping[str, Any] = field(default_factory=dict)
     target_settings: Mapping[str, Any] = field(default_factory=dict)
-    violated: tuple[int, ...] = ()
+    violated: tuple[int, ...] = ()  # properties of Definition 11 that do not hold
 
 
 _FLOOR = {"n_robots": 2, "hose_length": 20, "start": ((1, 1), (1, 0)), "goal": (2, 2)}

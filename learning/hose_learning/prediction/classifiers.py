@@ -156,15 +156,13 @@ class Setup:
 
 @dataclass(frozen=True)
 class ClassifierEntry:
-    """A classifier: its name in the thesis's tables, what runs here, its family and how it is made.
+    """A classifier, and how it is made."""
 
-    `stands_in` says whether scikit-learn lacks the thesis's algorithm, so that another one runs.
-    """
-
-    name: str
-    runs: str
+    name: str  # in the thesis's tables
+    runs: str  # what runs here
     family: Family
     make: Callable[[Setup], Classifier]
+    # Whether scikit-learn lacks the thesis's algorithm, so that another one runs.
     stands_in: bool = False
 
 

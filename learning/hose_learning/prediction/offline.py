@@ -40,16 +40,12 @@ class Published:
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """A table of the thesis, such as 8.2: what was classified, in words, and its rows.
+    """A table of the thesis."""
 
-    `cycles` is the length of the log, in moves of each agent; `agents` has for each agent the rows
-    by id of the classifier.
-    """
-
-    number: str
-    data: str
-    cycles: int
-    agents: tuple[dict[str, Published], ...]
+    number: str  # such as 8.2
+    data: str  # what was classified, in words
+    cycles: int  # length of the log, in moves of each agent
+    agents: tuple[dict[str, Published], ...]  # for each agent the rows by id of the classifier
 
 
 def read_table(task: str) -> PublishedTable | None:
@@ -108,17 +104,13 @@ class OfflinePlan:
 
 @dataclass(frozen=True)
 class Result:
-    """One classifier on one agent's moves: its scores on the first log, by `MEASURES`.
-
-    `over_logs` has the mean of each measure on every log (n_logs,), the first one's first;
-    `published` is the row of the thesis's table, None without one.
-    """
+    """One classifier on one agent's moves."""
 
     agent: str
     classifier: str
-    scores: Scores
-    over_logs: dict[str, Floats]
-    published: Published | None
+    scores: Scores  # on the first log
+    over_logs: dict[str, Floats]  # the mean of each measure on every log (n_logs,)
+    published: Published | None  # the row of the thesis's table, None without one
 
 
 @dataclass(frozen=True, eq=False)

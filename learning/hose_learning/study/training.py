@@ -23,14 +23,11 @@ Manner = Literal["turns", "joint", "composed"]
 
 @dataclass(frozen=True)
 class Episodes:
-    """Episodes as columns (n,): moves of single agents, last events, sums of all rewards.
+    """Episodes as columns (n,)."""
 
-    The sums are NaN in a test.
-    """
-
-    moves: Integers
-    events: Integers
-    returns: Floats
+    moves: Integers  # of single agents
+    events: Integers  # the last ones
+    returns: Floats  # sums of all rewards; NaN in a test
 
     def __len__(self) -> int:
         """Number of episodes."""

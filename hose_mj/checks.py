@@ -39,10 +39,5 @@ class Check:
     def as_record(self) -> dict[str, Any]:
         """Returns the check as it stands in a document; a value that is not finite becomes null."""
         value = float(self.value) if math.isfinite(self.value) else None
-        return {
-            "name": self.name,
-            "value": value,
-            "limit": float(self.limit),
-            "comparison": self.comparison,
-            "ok": self.ok,
-        }
+        held = {"limit": float(self.limit), "comparison": self.comparison, "ok": self.ok}
+        return {"name": self.name, "value": value, **held}

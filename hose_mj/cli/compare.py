@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -120,14 +120,9 @@ def prepare_cases(args: Args) -> Callable[[Callable[[str], None]], Study]:
     models = tuple(m for m in dict.fromkeys(args.models) if m != "cable" or not left_out)
 
     def measure(advance: Callable[[str], None]) -> Study:
-        study = run_study(
-            cases,
-            models,
-            quick=args.quick,
-            seed=args.seed,
-            with_numerics=not args.cases and "geds" in models,
-            advance=advance,
-        )
+        numerics = not args.cases and "geds" in models
+        options: Any = {"quick": args.quick, "seed": args.seed, "with_numerics": numerics}
+        study = run_study(cases, models, **options, advance=advance)
         study.committed = read_committed_cable(cases) if left_out else None
         return study
 

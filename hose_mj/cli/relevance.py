@@ -60,15 +60,9 @@ def run(args: Args) -> int:
     variables = args.variables or list_candidates(task, logs[0])
     found = [find_relevance(log, signals, variables, args.pooled) for log in logs]
     fresh = record_experience(task, args.fresh, last)
-    checks = [
-        Check(
-            f"{signal.name}: moves of a fresh log that are not told",
-            count_unexplained(found[0], signal, fresh, args.pooled),
-            0,
-            "==",
-        )
-        for signal in signals
-    ]
+    untold = {s.name: count_unexplained(found[0], s, fresh, args.pooled) for s in signals}
+    what = "moves of a fresh log that are not told"
+    checks = [Check(f"{name}: {what}", number, 0, "==") for name, number in untold.items()]
     title = f"{args.task}, {args.moves:,} random moves"
     show = partial(_print, found, title)
     return finish("relevance", args, checks, _list(found), show, begun=begun)

@@ -105,15 +105,11 @@ def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> l
     for k, rate in enumerate(exchange):
         name = f"exploring, at rate {rate:,.6g}"
         found.append((name, [o.controls[k][1] for o in outcomes]))
-    return [
-        {
-            "what": name,
-            "reached": sum(which),
-            "of": len(which),
-            "interval": compute_rate_interval(sum(which), len(which)),
-        }
-        for name, which in found
-    ]
+    rows = []
+    for name, which in found:
+        interval = compute_rate_interval(sum(which), len(which))
+        rows.append({"what": name, "reached": sum(which), "of": len(which), "interval": interval})
+    return rows
 
 
 def _print(args: Args, outcomes: list[TransferOutcome], rows: list[dict[str, Any]]) -> None:

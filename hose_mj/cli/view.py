@@ -45,13 +45,9 @@ def run(args: Args) -> int:
     else:
         open_recording(recording, at_s)
     if args.json:
+        facts = ("ended_by", "break_kind", "break_time")
         episodes = [
-            {
-                "model": name,
-                "ended_by": outcome["ended_by"],
-                "break_kind": outcome.get("break_kind"),
-                "break_time": outcome.get("break_time"),
-            }
+            {"model": name, **{fact: outcome.get(fact) for fact in facts}}
             for name, outcome in outcomes.items()
         ]
         results = {"recording": recording, "at": at_s, "episodes": episodes}

@@ -162,8 +162,4 @@ def _use_learner(task_id: str, learner: str) -> None:
     training.test(1, max_moves=1)
 
 
-GROUPS: dict[str, Callable[[], dict[str, Job]]] = {
-    "hose": list_hose_jobs,
-    "world": list_world_jobs,
-    "learn": list_learn_jobs,
-}
+GROUPS = {"hose": list_hose_jobs, "world": list_world_jobs, "learn": list_learn_jobs}

@@ -113,11 +113,8 @@ def play_one(
     record: Any, batch: Batch, sight: Sight, actions: Integers, at_once: bool, i: int
 ) -> None:
     """Steps copy `i`, or starts its next episode if the last one has ended."""
-    state, caused_events, reward_by_mover = (
-        batch.states[i],
-        batch.caused_events[i],
-        batch.reward_by_mover[i],
-    )
+    state, caused_events = batch.states[i], batch.caused_events[i]
+    reward_by_mover = batch.reward_by_mover[i]
     if batch.over[i]:
         kernels.reset(record, state, batch.streams[i])
         forget(caused_events, reward_by_mover)

@@ -10,6 +10,8 @@ from hose_mj.envs.interface import AgentsInterface
 from hose_mj.errors import InputError
 from hose_mj.tasks.task import Task
 
+Named = dict[str, Any]
+
 
 class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
     """The agents of a task, one action of each at a step.
@@ -28,7 +30,7 @@ class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    ) -> tuple[Named, dict[str, Named]]:
         """Starts an episode; `options` are ignored, for there are none."""
         self._start(seed)
         self._renderer.follow(self.episode)
@@ -36,13 +38,7 @@ class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
 
     def step(
         self, actions: Mapping[str, Any]
-    ) -> tuple[
-        dict[str, Any],
-        dict[str, float],
-        dict[str, bool],
-        dict[str, bool],
-        dict[str, dict[str, Any]],
-    ]:
+    ) -> tuple[Named, dict[str, float], dict[str, bool], dict[str, bool], dict[str, Named]]:
         """Lets all agents move.
 
         Raises:

@@ -48,6 +48,5 @@ class GridEpisode:
             lengths["hose"] = len(self.hose)
         for name, length in lengths.items():
             if length != len(self.turns):
-                raise InputError(
-                    f"length of {name}", length, f"{len(self.turns)}, one for each turn"
-                )
+                valid = f"{len(self.turns)}, one for each turn"
+                raise InputError(f"length of {name}", length, valid)

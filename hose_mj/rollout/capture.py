@@ -371,10 +371,5 @@ def make_mark(broken: Any | None) -> world_episode.BreakMark | None:
     """Turns a `Break` into what a recording shows of it."""
     if broken is None:
         return None
-    return world_episode.BreakMark(
-        broken.kind,
-        broken.time,
-        np.array(broken.place),
-        f"{broken.kind}: {broken.describe()}",
-        broken.to_record(),
-    )
+    place, text = np.array(broken.place), f"{broken.kind}: {broken.describe()}"
+    return world_episode.BreakMark(broken.kind, broken.time, place, text, broken.to_record())

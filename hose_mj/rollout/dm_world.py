@@ -70,9 +70,8 @@ class WorldPhysics(dm_mujoco.Physics):
     def reset(self, keyframe_id: int | None = None) -> None:
         """Returns to the start of the scene, the only one; `InputError` for a keyframe."""
         if keyframe_id is not None:
-            raise InputError(
-                "keyframe_id", keyframe_id, "None: a world starts where its scene does"
-            )
+            valid = "None: a world starts where its scene does"
+            raise InputError("keyframe_id", keyframe_id, valid)
         self.world.reset()
         self.monitor.reset()
         self.broken = None

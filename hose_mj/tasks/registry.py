@@ -46,6 +46,7 @@ class TaskEntry:
 
 _LINE = ("hose_mj.tasks.line.settings", "LineSettings", "make_line")
 _TAXI = ("hose_mj.tasks.taxi.settings", "TaxiSettings", "make_taxi")
+_TINY = "hose_mj.tasks.tiny.settings"
 TASKS: dict[str, TaskEntry] = {
     "line": TaskEntry(
         *_LINE,
@@ -88,16 +89,11 @@ TASKS: dict[str, TaskEntry] = {
         is_alone=True,
     ),
     "corridor": TaskEntry(
-        "hose_mj.tasks.tiny.settings",
-        "CorridorSettings",
-        "make_corridor",
+        *(_TINY, "CorridorSettings", "make_corridor"),
         "two robots in a corridor of three cells (Example 1, section 6.4)",
     ),
     "maze": TaskEntry(
-        "hose_mj.tasks.tiny.settings",
-        "MazeSettings",
-        "make_maze",
-        "one robot among the walls of Table 5.1",
+        *(_TINY, "MazeSettings", "make_maze", "one robot among the walls of Table 5.1"),
         is_alone=True,
     ),
 }

@@ -33,6 +33,7 @@ ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 """Turns a cylinder's axis to y, across the plane in which hoses are laid."""
 
 _MOTION = partial(make_case, gravity=DOWN, scale=LENGTH)
+_FREE = Motion(1.0, 50)
 
 
 def _ease(time: float, ramp: float) -> float:
@@ -43,12 +44,7 @@ def _ease(time: float, ramp: float) -> float:
 def make_released_rod() -> Case:
     """A horizontal cantilever let go."""
     return _MOTION(
-        "released-rod",
-        spec=ROD,
-        lay=lay_cantilever,
-        probe=read_tip,
-        motion=Motion(1.0, 50),
-        clamped=True,
+        "released-rod", spec=ROD, lay=lay_cantilever, probe=read_tip, motion=_FREE, clamped=True
     )
 
 
@@ -67,14 +63,8 @@ def make_free_flight() -> Case:
         hose.reset([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]], speed)
         return []
 
-    return make_case(
-        "free-flight",
-        spec=ROD,
-        lay=lay,
-        probe=read_places((0.0, 0.5, 1.0)),
-        scale=LENGTH,
-        motion=Motion(1.0, 50),
-    )
+    probe = read_places((0.0, 0.5, 1.0))
+    return make_case("free-flight", spec=ROD, lay=lay, probe=probe, scale=LENGTH, motion=_FREE)
 
 
 def make_taut_pull() -> Case:
@@ -308,7 +298,7 @@ def make_obstacle_drop() -> Case:
         ),
         lay=lay_cantilever,
         probe=read_places((0.5, 0.75, 1.0)),
-        motion=Motion(1.0, 50),
+        motion=_FREE,
         clamped=True,
         models=("geds", "cable"),
         obstacles=(bar,),

@@ -71,14 +71,9 @@ class GedsWorld(World):
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         model.opt.timestep = scene.timestep if timestep is None else timestep
         n = count_control_points(self.n_robots) if control_points is None else control_points
-        self.hose = GedsHose(
-            scene.spec,
-            timestep=model.opt.timestep,
-            gravity=model.opt.gravity,
-            control_points=n,
-            scheme=scheme,
-            tolerance=1e-6,
-        )
+        options: Any = {"control_points": n, "scheme": scheme, "tolerance": 1e-6}
+        options |= {"timestep": model.opt.timestep, "gravity": model.opt.gravity}
+        self.hose = GedsHose(scene.spec, **options)
         self.coupling_iterations = 0
         self._start_bodies()
         self._contact = GedsContact(self.model, self.data, self.hose, self.sites, self.arc_lengths)

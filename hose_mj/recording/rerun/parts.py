@@ -20,15 +20,8 @@ OUTCOME = "outcome"  # begins the names of the properties that say how episodes 
 FACTS = ("ended_by", "break_kind", "break_time", "break_text")
 DARK = (17, 20, 24)  # ground colour of the spatial views
 HALF_VIEW = float(np.tan(np.radians(27.5)))  # the viewer's vertical field of view is 55 degrees
-_QUANTITIES = {
-    "m": "Distance",
-    "mm": "Distance",
-    "m/s": "Speed",
-    "N": "Force",
-    "N m": "Moment",
-    "J": "Energy",
-    "rad": "Angle",
-}
+_QUANTITIES = {"m": "Distance", "mm": "Distance", "m/s": "Speed", "N": "Force", "N m": "Moment"}
+_QUANTITIES |= {"J": "Energy", "rad": "Angle"}
 
 
 def open_stream(

@@ -102,14 +102,8 @@ def _check_transitions(
     if len(wrong) == 0:
         return None
     state, action = divmod(int(rows[wrong[0]]), n_actions)
-    return PcmViolation(
-        2,
-        len(wrong),
-        state,
-        action,
-        describe_move(source, int(projection[state]), action),
-        describe_move(target, state, action),
-    )
+    move = describe_move(source, int(projection[state]), action)
+    return PcmViolation(2, len(wrong), state, action, move, describe_move(target, state, action))
 
 
 def _check_rewards(
@@ -130,14 +124,9 @@ def _check_rewards(
             yield None
             continue
         state = int(wrong[0])
-        yield PcmViolation(
-            number,
-            len(wrong),
-            state,
-            None,
-            f"{source.names[projection[state]]}: reward {in_source[state]:g}",
-            f"{target.names[state]}: reward {target.rewards[state]:g}",
-        )
+        ours = f"{source.names[projection[state]]}: reward {in_source[state]:g}"
+        theirs = f"{target.names[state]}: reward {target.rewards[state]:g}"
+        yield PcmViolation(number, len(wrong), state, None, ours, theirs)
 
 
 def describe_move(model: MarkovModel, state: int, action: int) -> str:

@@ -179,11 +179,8 @@ class Training:
             raise InputError("manner", manner, f"{' or '.join(valid)} for {self.learner_id}")
         results = np.zeros((episodes, 2), np.int64)
         probe = evaluation.make_probe(self.memory)
-        manners = {
-            "turns": evaluation.Turns(),
-            "joint": evaluation.Joint(),
-            "composed": evaluation.Composed(self.task.make_state()),
-        }
+        composed = evaluation.Composed(self.task.make_state())
+        manners = {"turns": evaluation.Turns(), "joint": evaluation.Joint(), "composed": composed}
         most = self.task.step_limit if max_moves is None else max_moves
         run = evaluation.run_tests if self._compiled else evaluation.run_tests.py_func
         run(manners[manner], self.task.kernel, self.learner, probe, episodes, most, results)

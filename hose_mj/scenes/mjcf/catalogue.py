@@ -52,6 +52,8 @@ def find_named(name: str | Path) -> Path | None:
     Raises:
         InputError: another package's scene that cannot be had.
     """
+    if not isinstance(name, (str, os.PathLike)):
+        raise InputError("scene", name, "the name of a scene, or an MJCF file")
     path = Path(name)
     if path.suffix == ".xml" or len(path.parts) != 1:
         return None

@@ -68,6 +68,6 @@ def _suggest(value: object, valid: str) -> str:
     """What a misspelt word may have meant, out of those that are valid."""
     if not isinstance(value, str):
         return ""
-    known = re.findall(r"[\w.-]+", valid)
+    known = re.findall(r"[\w.-]+", valid.partition(" (")[0])  # there stands why
     near = difflib.get_close_matches(value, known, n=1, cutoff=0.7)
     return f" (did you mean {near[0]}?)" if near and near[0] != value else ""

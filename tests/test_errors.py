@@ -35,7 +35,7 @@ def test_a_choice_is_one_of_the_known_words_and_the_nearest_is_suggested():
 ODD = [10**400, 10**5000, 1j, {}, set(), "1", "", None, np.zeros(3), np.array(["a"]), math.inf]
 
 
-@pytest.mark.parametrize("odd", ODD)
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: type(odd).__name__)
 def test_what_is_no_finite_number_is_refused_everywhere(odd):
     assert not is_finite(odd)
     with pytest.raises(InputError, match="limit of error"):

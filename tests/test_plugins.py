@@ -116,6 +116,7 @@ def test_a_broken_task_of_others_leaves_runs_of_ours_alone(folder):
     assert describe(training, 0)["task"] == "maze"
 
 
+@pytest.mark.filterwarnings("always::RuntimeWarning")
 @pytest.mark.parametrize(
     ("kind", "group", "ours"),
     [

@@ -109,7 +109,7 @@ def _complain(text: str) -> None:
         print(f"hose-mj: error: {text}", file=sys.stderr)
 
 
-def _show_warning(message: Warning | str, *_: object) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     with suppress(OSError):
         print(f"hose-mj: warning: {' '.join(str(message).split())}", file=sys.stderr)
 
@@ -253,20 +253,32 @@ def _finish_help(name: str, text: str) -> str:
     lines = [line for line in text.splitlines() if not re.fullmatch(r"[│|]\s+[│|]", line)]
     lines = [line if line[:1] in "│╭╰|+" else _wrap(line) for line in lines]
     examples = COMMANDS[name].examples if name in COMMANDS else ()
-    lines += ["", "examples:", *(f"  {line}" for line in examples), ""] if examples else []
+    if examples:
+        lines += ["", "examples:", *map(_wrap_command, examples), ""]
     return "\n".join([*lines, _wrap(ENDING), ""])
 
 
 def _wrap(text: str) -> str:
     """Returns paragraphs that fit into the terminal."""
-    width = min(100, max(40, shutil.get_terminal_size().columns))
-    return "\n\n".join(textwrap.fill(" ".join(one.split()), width) for one in text.split("\n\n"))
+    parts = (" ".join(one.split()) for one in text.split("\n\n"))
+    return "\n\n".join(textwrap.fill(part, _find_width()) for part in parts)
+
+
+def _wrap_command(line: str) -> str:
+    """Returns a command line that a shell takes as it stands, in lines that fit."""
+    style: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
+    parts = textwrap.wrap(line, _find_width() - 6, **style)
+    return "  " + " \\\n    ".join(parts)
+
+
+def _find_width() -> int:
+    return min(100, max(40, shutil.get_terminal_size().columns))
 
 
 def make_help() -> str:
     """Returns the help of the program: the commands, by what they are for."""
     indent = 4 + max(map(len, COMMANDS))
-    width = min(100, max(50, shutil.get_terminal_size().columns))
+    width = _find_width()
     about = (hose_mj.__doc__ or "").splitlines()[0]
     lines = ["usage: hose-mj COMMAND [ARGUMENTS]", "       hose-mj COMMAND --help", ""]
     lines += [*textwrap.wrap(about, width), "", "commands:"]

@@ -142,9 +142,9 @@ def test_every_command_takes_json_and_its_help_reads_well(name, capsys, monkeypa
     assert "{None}" not in out
     assert not re.search(r"None\)|\(default:[\s│]*\)", out)
     assert "without effect" not in out
-    assert max(map(len, out.partition("examples:")[0].splitlines())) <= 80
+    assert max(map(len, out.splitlines())) <= 60
     for line in cli.COMMANDS[name].examples:
-        assert f"  {line}\n" in out
+        assert f"  {line}\n" in out.replace(" \\\n   ", "")
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)
@@ -287,12 +287,11 @@ def test_help_loads_nothing_heavy(words, more):
 HEAVY = ("numba", "scipy", "mujoco", "rerun", "matplotlib", "pyarrow", "gymnasium", "pettingzoo")
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
-def test_the_help_of_a_command_fits_into_a_narrow_terminal(name, capsys, monkeypatch):
+@pytest.mark.parametrize("names", [[], *([name] for name in cli.COMMANDS)])
+def test_help_fits_into_a_narrow_terminal(names, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
-    assert cli.main(["help", name]) == 0
-    wide = [line for line in capsys.readouterr().out.splitlines() if len(line) > 40]
-    assert not [line for line in wide if not line.startswith("  hose-mj") and "eval" not in line]
+    assert cli.main(["help", *names]) == 0
+    assert not [line for line in capsys.readouterr().out.splitlines() if len(line) > 40]
 
 
 def test_help_is_a_command_too(capsys):

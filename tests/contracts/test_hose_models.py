@@ -442,7 +442,9 @@ ODD_CALLS = {
     "velocity function": lambda h, hold, odd: h.reset(arch, lambda s: odd),
     "steps": lambda h, hold, odd: h.step(odd),
     "snapshot": lambda h, hold, odd: h.restore(odd),
-    "timestep": lambda h, hold, odd: make(odd, timestep=odd),
+    "timestep": lambda h, hold, odd: type(h)(make_spec(), timestep=odd),
+    "gravity": lambda h, hold, odd: type(h)(make_spec(), timestep=1e-3, gravity=odd),
+    "model": lambda h, hold, odd: make_hose(odd, make_spec(), timestep=1e-3),
 }
 
 

@@ -20,7 +20,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, read_catalogue
 from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.hose_file.spec import LENGTHS, read_spec
-from hose_mj.scenes.mjcf.catalogue import find_scene, list_scenes
+from hose_mj.scenes.mjcf.catalogue import find_named, find_scene, list_scenes
 from hose_mj.scenes.mjcf.files import read_files, shorten
 from hose_mj.scenes.mjcf.model import probe
 from hose_mj.toml_table import LARGEST_NUMBER, TomlTable
@@ -139,7 +139,7 @@ def read_scene(path: str | Path) -> Scene:
     Raises:
         InputError: the first thing that is wrong: file, element, value and what would be valid.
     """
-    files = read_files(find_scene(path))
+    files = read_files(find_named(path) or Path(path))
     facts = probe(files.path)
     file = shorten(files.path.name)
     numerics = facts["numerics"]

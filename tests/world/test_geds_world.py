@@ -241,7 +241,7 @@ def test_mistakes_are_named_and_change_nothing():
         make_world("floor_2", "rope")
 
 
-ODD = [10**400, 1j, {"a": 1}, "text", np.zeros((2, 2)), object(), 1e160]
+ODD = [10**400, 1j, {"a": 1}, "text", np.zeros((2, 2)), object()]
 
 
 @pytest.mark.parametrize("model", ["geds", "flex"])
@@ -250,7 +250,7 @@ def test_what_is_no_number_and_no_scene_is_refused(model):
     before = world.snapshot()
     for odd in ODD:
         for call in (
-            lambda odd=odd: make_world("floor_2", model, timestep=odd if odd != 1e160 else 1j),
+            lambda odd=odd: make_world("floor_2", model, timestep=odd),
             lambda odd=odd: world.step(odd),
             lambda odd=odd: world.hose_position(odd),
             lambda odd=odd: world.tension(odd),
@@ -262,6 +262,8 @@ def test_what_is_no_number_and_no_scene_is_refused(model):
         ):
             with pytest.raises(InputError):
                 call()
+    with pytest.raises(InputError, match=r"force is .*each at most 1e\+15"):
+        world.apply_force(0, [1e160, 0.0, 0.0])
     world.control[0] = 1e160
     with pytest.raises(InputError, match=r"control is .*each at most 1e\+15"):
         world.step()

@@ -17,7 +17,6 @@ from hose_mj.cli.progress import show_progress
 from hose_mj.cli.results import check_counts, finish
 from hose_mj.constraints.limits import Limits
 from hose_mj.errors import InputError, check_choice
-from hose_mj.scenes.mjcf.scene import find_scene, read_scene
 from hose_mj.world.registry import WORLDS, make_world
 
 if TYPE_CHECKING:
@@ -64,6 +63,7 @@ class Args:
 def run(args: Args) -> int:
     """Plays all sequences; 1 if two models agree in less than 90 % of them."""
     from hose_mj.rollout.break_sequences import EndingsFile, draw_sequences, play_all
+    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
     from hose_mj.world.initial_shape import count_control_points
 
     check_counts(args, sequences=1, moves=1, seed=0)

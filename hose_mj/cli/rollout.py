@@ -14,7 +14,6 @@ from hose_mj.cli.results import check_counts
 from hose_mj.errors import InputError, check_choice
 from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
-from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 from hose_mj.world.registry import WORLDS, make_world
 
 if TYPE_CHECKING:
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from hose_mj.recording.sinks import Sink
     from hose_mj.rollout.capture import Capture
     from hose_mj.rollout.episode import EpisodeResult, Observer, Policy
+    from hose_mj.scenes.mjcf.scene import Scene
     from hose_mj.world.world import World
 
 ENDINGS = {"save": ".rrd", "mp4": ".mp4", "csv": ".csv"}
@@ -220,6 +220,8 @@ class Recording:
 
 def run(args: Args) -> int:
     """Runs the episodes; 0 when done."""
+    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+
     models = _check(args)
     scene = read_scene(find_scene(args.scene))
     with Recording(args, scene, len(models)) as recording:

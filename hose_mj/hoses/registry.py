@@ -11,12 +11,14 @@ import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, PackageNotFoundError, version
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from hose_mj.errors import InputError, check_choice
-from hose_mj.hoses.protocol import HoseModel
 from hose_mj.hoses.spec import HoseSpec, check_spec
 from hose_mj.plugins import find_plugins, load_plugin, load_plugins
+
+if TYPE_CHECKING:
+    from hose_mj.hoses.protocol import HoseModel
 
 GROUP = "hose_mj.hoses"
 """Entry points of this group are hose models."""
@@ -212,4 +214,4 @@ def make_hose(model: str, spec: HoseSpec, **options: Any) -> HoseModel:
     for name, parameter in parameters.items():
         if parameter.default is inspect.Parameter.empty and name not in options:
             raise InputError(f"options of {model}", sorted(options), f"with {name!r} among them")
-    return cast(HoseModel, made(spec, **options))
+    return cast("HoseModel", made(spec, **options))

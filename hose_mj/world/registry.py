@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from hose_mj.errors import check_choice
 from hose_mj.hoses.registry import check_model, check_options
-from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
 
 if TYPE_CHECKING:
+    from hose_mj.scenes.mjcf.scene import Scene
     from hose_mj.world.world import World
 
 WORLDS = {
@@ -32,6 +32,8 @@ def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -
     Raises:
         InputError: an unknown scene, model or option, or what reading the scene finds wrong.
     """
+    from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
+
     check_choice("model", model, WORLDS)
     check_model(model)
     module, _, name = WORLDS[model].partition(":")

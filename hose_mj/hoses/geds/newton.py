@@ -218,8 +218,7 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
         if verdict != DONE:
             return verdict, iteration, fallbacks
         largest, slope = _measure_step(axes, limits, len(x), work)
-        # The largest entry passes over one that is not a number; their sum does not.
-        if not np.isfinite(largest + slope):
+        if not np.isfinite(largest):
             return NOT_FINITE, iteration, fallbacks
         factor = 1.0
         if limits.rotation_cap < np.inf:

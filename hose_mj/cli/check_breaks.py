@@ -8,19 +8,19 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
-from hose_mj.cli.results import check_choice, check_counts, finish
+from hose_mj.cli.results import check_counts, finish
 from hose_mj.constraints.limits import Limits
-from hose_mj.errors import InputError
-from hose_mj.rollout.break_sequences import Ending, EndingsFile, Move, draw_sequences, play_all
-from hose_mj.scenes.mjcf.scene import find_scene, read_scene
-from hose_mj.world.initial_shape import count_control_points
+from hose_mj.errors import InputError, check_choice
 from hose_mj.world.registry import WORLDS, make_world
+
+if TYPE_CHECKING:
+    from hose_mj.rollout.break_sequences import Ending, Move
 
 AGREE = 0.9
 QUICK = 20
@@ -56,6 +56,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Plays all sequences; 1 if two models agree in less than 90 % of them."""
+    from hose_mj.rollout.break_sequences import EndingsFile, draw_sequences, play_all
+    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+    from hose_mj.world.initial_shape import count_control_points
+
     check_counts(args, sequences=1, moves=1, seed=0)
     if len(set(args.models)) < max(2, len(args.models)):
         raise InputError("models", args.models, "at least two, each once")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 import tyro
-from hose_learning.mdp.sequential_realization import PROPERTIES, SequentialStudy, study_sequential
 
 from hose_mj.checks import Check
 from hose_mj.cli.results import check_counts, finish
 from hose_mj.cli.task_options import parse_options
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.stream import make_stream
+
+if TYPE_CHECKING:
+    from hose_learning.mdp.sequential_realization import SequentialStudy
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,11 @@ class Args:
 
 def run(args: Args) -> int:
     """Checks a task; 1 if a property does not hold."""
+    import numpy as np
+    from hose_learning.mdp.sequential_realization import PROPERTIES, study_sequential
+
+    from hose_mj.tasks.stream import make_stream
+
     check_counts(args, seed=0)
     task = make_task(args.task, **parse_options(args.set))
     start = task.reset(make_stream(np.random.default_rng(args.seed)))

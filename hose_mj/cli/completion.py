@@ -14,8 +14,7 @@ import tyro
 
 from hose_mj.cli.commands import COMMANDS
 from hose_mj.cli.listing import KINDS
-from hose_mj.cli.results import check_choice
-from hose_mj.errors import HoseError
+from hose_mj.errors import HoseError, check_choice
 from hose_mj.recording.document import make_document, print_document
 
 NAMED = {

@@ -7,16 +7,18 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
-from hose_learning.study.experiments import EXPERIMENTS, Experiment, Finding
-from hose_learning.study.jobs import do_all
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
-from hose_mj.cli.results import check_choice, check_counts
+from hose_mj.cli.results import check_counts
+from hose_mj.errors import check_choice
 from hose_mj.recording.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_learning.study.experiments import Experiment, Finding
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,9 @@ class Args:
 
 def run(args: Args) -> int:
     """Runs the experiments; 1 if a check failed."""
+    from hose_learning.study.experiments import EXPERIMENTS
+    from hose_learning.study.jobs import do_all
+
     for item in args.items:
         check_choice("item", item, EXPERIMENTS)
     check_counts(args, seeds=1, seed=0, workers=1)

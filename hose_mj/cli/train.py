@@ -9,25 +9,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
-from hose_learning.learners import catalog
-from hose_learning.presets import VALUES, VETOES
-from hose_learning.settings import Exploration
-from hose_learning.study.statistics import compute_rate_interval
-from hose_learning.study.training import Episodes, Training, join
 
 from hose_mj.cli.progress import defer_interrupt, show_progress
-from hose_mj.cli.results import check_choice, check_counts, print_table
+from hose_mj.cli.results import check_counts, print_table
 from hose_mj.cli.task_options import parse_options
+from hose_mj.errors import check_choice
 from hose_mj.extras import require
-from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.tasks.registry import list_tasks, make_task
-from hose_mj.tasks.task import Task
 
 if TYPE_CHECKING:
+    from hose_learning.settings import Exploration
     from hose_learning.study.run_folder import RunFolder
+    from hose_learning.study.training import Episodes, Training
+
+    from hose_mj.tasks.task import Task
 
 DEFAULT_EPISODES = {"line": 100_000, "line-non-cooperative": 100_000, "line-2015": 20_000}
 """Where the default of 2,000 episodes is too few."""
@@ -80,6 +77,10 @@ class Args(LearnerArgs):
 
 def run(args: Args) -> int:
     """Trains; 0 when done."""
+    from hose_learning.presets import VALUES, VETOES
+
+    from hose_mj.jit import compile_notice
+
     if args.list:
         _list(args)
         return 0
@@ -115,6 +116,10 @@ def make_training(args: Args) -> Training:
     Raises:
         InputError: an unknown task or learner, or a setting that it does not allow.
     """
+    import numpy as np
+    from hose_learning.learners import catalog
+    from hose_learning.study.training import Training
+
     task = make_task(args.task, **parse_options(args.set))
     id = args.learner or ("thresholded-msav" if args.task.startswith("line") else "d-rr-ql")
     catalog.find_learner(id)
@@ -164,6 +169,8 @@ def _given(args: Args) -> dict[str, Any]:
 
 def _explore(args: Args, task: Task) -> Exploration:
     """Epsilon as asked for; else .3 throughout on random line tasks (4.6.1.2), and falling."""
+    from hose_learning.settings import Exploration
+
     is_random = task.id.startswith("line") and task.settings.goal == "random"
     if is_random and args.epsilon_per_episode is None and args.epsilon_per_success is None:
         return Exploration(epsilon=0.3 if args.epsilon is None else args.epsilon)
@@ -182,14 +189,18 @@ def _count_episodes(args: Args, task: Task) -> int:
 
 def _compile(training: Training) -> None:
     """Runs the loop and the test once on a training of its own, so that compiling is not timed."""
+    import numpy as np
+
     parts = (training.task, training.learner_id, training.settings)
-    trial = Training(*parts, np.random.default_rng(0))
+    trial = type(training)(*parts, np.random.default_rng(0))
     trial.advance(moves=1)
     trial.test(1, max_moves=1)
 
 
 def _train(training: Training, folder: RunFolder, args: Args) -> Episodes:
     """Trains to the end, with a progress bar and checkpoints; returns what ended meanwhile."""
+    from hose_learning.study.training import join
+
     episodes = max(0, _count_episodes(args, training.task) - training.episodes)
     moves = None if args.moves is None else max(0, args.moves - training.moves)
     parts: list[Episodes] = []
@@ -215,6 +226,8 @@ def _train(training: Training, folder: RunFolder, args: Args) -> Episodes:
 def _summarize(
     training: Training, folder: RunFolder, ended: Episodes, tests: Episodes
 ) -> dict[str, Any]:
+    from hose_learning.study.statistics import compute_rate_interval
+
     task = training.task
     last = ended.find_successes(task)[-max(1, len(ended) // 10) :]
     success = tests.find_successes(task)
@@ -236,6 +249,8 @@ def _summarize(
 
 
 def _list(args: Args) -> None:
+    from hose_learning.learners import catalog
+
     style: dict[str, Any] = {"box": None, "title_justify": "left", "show_header": False}
     tasks = [(id, "", entry.description) for id, entry in list_tasks().items()]
     learners = [(id, e.section, e.description) for id, e in catalog.list_learners().items()]

@@ -5,19 +5,18 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
-from hose_learning.study.statistics import compute_rate_interval
-from hose_learning.transfer import TransferOutcome, TransferPlan, run_trial
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
 from hose_mj.cli.results import check_counts, finish, print_table
 from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
-from hose_mj.jit import compile_notice
+
+if TYPE_CHECKING:
+    from hose_learning.transfer import TransferOutcome
 
 
 @dataclass(frozen=True)
@@ -64,6 +63,11 @@ def run(args: Args) -> int:
 
 def _run_all(args: Args) -> list[TransferOutcome]:
     """Runs one configuration after the other, each with a generator of its own."""
+    import numpy as np
+    from hose_learning.transfer import TransferPlan, run_trial
+
+    from hose_mj.jit import compile_notice
+
     options = read_options(args.set, ("source", "target"))
     plan = TransferPlan(
         source=args.source,
@@ -91,6 +95,7 @@ def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> l
     One row for each greedy episode (the goal was reached in it for the first time), one for any of
     them, one for the greedy policy on the source, one for each control.
     """
+    from hose_learning.study.statistics import compute_rate_interval
 
     def first(outcome: TransferOutcome) -> int | None:
         return outcome.reached.index(True) if any(outcome.reached) else None

@@ -11,8 +11,7 @@ from typing import Annotated, Any
 import tyro
 
 from hose_mj.cli.progress import show_progress
-from hose_mj.cli.results import check_choice
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.recording.document import make_document, print_document
 
 SCHEMES = ("bdf2", "backward-euler", "sdirk2", "midpoint")

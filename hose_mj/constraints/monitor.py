@@ -14,6 +14,7 @@ from hose_mj.constraints.hose_distance import BALL
 from hose_mj.constraints.kinds import KIND_OF, KINDS, OBSTACLE, RUN_OVER, Kind, Watched
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.margin_kernels import OTHER_KIND, Ints, Tables, measure_margins
+from hose_mj.errors import InputError
 from hose_mj.hoses.geds import shapes
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compile_notice
@@ -80,10 +81,14 @@ class Monitor:
         breaks: all that the last `check` or `reset` found, the earliest first.
 
     Raises:
-        InputError: a robot without geoms, or limits that name a geom that is not there.
+        InputError: no world, a robot without geoms, or limits that name a geom that is not there.
     """
 
     def __init__(self, world: World, limits: Limits | None = None) -> None:
+        if not isinstance(world, World):
+            raise InputError("world", world, "a world, as make_world returns it")
+        if limits is not None and not isinstance(limits, Limits):
+            raise InputError("limits", limits, "a Limits, or None for the defaults")
         self.world, self.limits = world, limits or Limits()
         self._footprints = [make_footprint(world, i) for i in range(world.n_robots)]
         self._obstacles = find_obstacles(world, self._footprints, self.limits.ground)

@@ -19,11 +19,12 @@ import dataclasses
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING, Any, cast
 
 from hose_mj.errors import InputError, check_choice
-from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.plugins import find_plugins, load_plugin, load_plugins
 
 if TYPE_CHECKING:
     from hose_mj.tasks.task import Task
@@ -115,10 +116,9 @@ def list_tasks() -> dict[str, TaskEntry]:
     """Returns all tasks by id, those of other packages last.
 
     Raises:
-        InputError: an id that is taken, or a package whose entry cannot be imported.
+        InputError: an id that is taken.
     """
-    plugins = {id: load_plugin(entry, TaskEntry) for id, entry in find_task_plugins().items()}
-    return {**TASKS, **plugins}
+    return {**TASKS, **load_plugins(find_task_plugins(), partial(load_plugin, kind=TaskEntry))}
 
 
 def find_task(id: str) -> TaskEntry:

@@ -195,7 +195,7 @@ class MujocoWorld(World):
                 mujoco.mj_step(self.model, self.data)
                 total += self._find_hold_forces()
         if went_bad(self.data):
-            self.restore(before)
+            self._restore(before)
             raise StepError(
                 f"MuJoCo met a NaN or a huge number in the step from time {self.time:g} s at "
                 f"timestep {self.timestep:g} s in {self.substeps} substeps: {self._advice}"

@@ -7,16 +7,16 @@ measured in turns of a clock that is neither fast nor slow: 1/v is the unit.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
 
 from hose_mj.errors import InputError
 from hose_mj.recording.palette import OTHERS, darken, format_hex
-from hose_mj.recording.plots.labels import label_line_ends
-from hose_mj.recording.plots.style import SOFT, encode_png, make_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -349,6 +349,9 @@ def run_trial(settings: ConsensusSettings, seed: int) -> ConsensusTrial:
 
 def draw_consensus(trials: Sequence[ConsensusTrial], own: ConsensusTrial) -> bytes:
     """Returns the PNG: disagreement of all trials over time above, the actions of one below."""
+    from hose_mj.recording.plots.labels import label_line_ends
+    from hose_mj.recording.plots.style import encode_png, make_figure
+
     n = own.settings.n_agents
     with make_figure((7.6, 5.6), f"{n} clocks agree on whose turn it is") as figure:
         above, below = figure.subplots(2, 1, height_ratios=(3, 2))
@@ -382,6 +385,8 @@ def _draw_agreement(axes: Axes, trials: Sequence[ConsensusTrial]) -> list[tuple[
 
 def _draw_actions(axes: Axes, trial: ConsensusTrial) -> None:
     """Draws a bar for each action, with its turn, on the line of its agent."""
+    from hose_mj.recording.plots.style import SOFT
+
     settings = trial.settings
     shown = trial.play.actions[:SHOWN_ACTIONS]
     for action in shown:

@@ -15,7 +15,8 @@ from typing import Annotated
 import tyro
 
 from hose_mj.checks import Check
-from hose_mj.cli.results import check_choice, check_counts, finish, print_table
+from hose_mj.cli.results import check_counts, finish, print_table
+from hose_mj.errors import check_choice
 
 GROUPS = {
     "env": "hose_mj.cli.bench.env",

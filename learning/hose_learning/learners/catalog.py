@@ -17,6 +17,7 @@ import importlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -27,7 +28,7 @@ from hose_learning.presets import make_modules
 from hose_learning.records import Memory
 from hose_learning.settings import LearnerSettings
 from hose_mj.errors import InputError, check_choice
-from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.plugins import find_plugins, load_plugin, load_plugins
 from hose_mj.tasks.task import Task
 
 GROUP = "hose_learning.learners"
@@ -69,11 +70,10 @@ def list_learners() -> dict[str, LearnerEntry]:
     """Returns all learners by id, those of other packages last.
 
     Raises:
-        InputError: an entry point of another package takes a name of ours, cannot be imported, or
-            is no `LearnerEntry`.
+        InputError: an entry point of another package takes a name of ours.
     """
-    plugins = find_plugins(GROUP, LEARNERS)
-    return {**LEARNERS, **{id: load_plugin(point, LearnerEntry) for id, point in plugins.items()}}
+    load = partial(load_plugin, kind=LearnerEntry)
+    return {**LEARNERS, **load_plugins(find_plugins(GROUP, LEARNERS), load)}
 
 
 def find_learner(id: str) -> LearnerEntry:

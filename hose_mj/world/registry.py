@@ -1,5 +1,7 @@
 """Worlds by the name of the hose's model."""
 
+from __future__ import annotations
+
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

@@ -5,6 +5,8 @@ clocks once a round, and acts while its own clock says that the turn is its own.
 measured in turns of a clock that is neither fast nor slow: 1/v is the unit.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple

@@ -1,7 +1,5 @@
 """Where the files that ship with hose_mj lie: materials, example hoses, scenes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hose_mj.errors import InputError

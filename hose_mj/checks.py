@@ -1,61 +1,41 @@
 """`Check`: a measured number against its limit, as commands print it and reports show it."""
 
-from __future__ import annotations
-
-import math
 import operator
 from dataclasses import dataclass
 from typing import Any
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice, is_finite
 
-_COMPARISONS = {
-    "<=": operator.le,
-    "<": operator.lt,
-    ">=": operator.ge,
-    ">": operator.gt,
-    "==": operator.eq,
-}
+_COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
+_COMPARISONS |= {"==": operator.eq}
 
 
 @dataclass(frozen=True)
 class Check:
     """A measured number against its limit.
 
-    Attributes:
-        name: what was measured.
-        value: the number measured; one that is not finite never passes.
-        limit: the bound it is held against.
-        comparison: how value and limit must stand: ``<=``, ``<``, ``>=``, ``>`` or ``==``.
-
     Raises:
         InputError: an unknown comparison or a limit that is not finite.
     """
 
-    name: str
-    value: float
-    limit: float
-    comparison: str = "<="
+    name: str  # what was measured
+    value: float  # the number measured; one that is not finite never passes
+    limit: float  # the bound it is held against
+    comparison: str = "<="  # how value and limit must stand: `<=`, `<`, `>=`, `>` or `==`
 
     def __post_init__(self) -> None:
-        if self.comparison not in _COMPARISONS:
-            raise InputError("comparison", self.comparison, " ".join(_COMPARISONS))
-        if not math.isfinite(self.limit):
+        check_choice("comparison", self.comparison, _COMPARISONS)
+        if not is_finite(self.limit):
             raise InputError(f"limit of {self.name}", self.limit, "a finite number")
 
     @property
     def ok(self) -> bool:
         """Whether the value keeps to the limit."""
         compare = _COMPARISONS[self.comparison]
-        return math.isfinite(self.value) and bool(compare(self.value, self.limit))
+        return is_finite(self.value) and bool(compare(self.value, self.limit))
 
     def as_record(self) -> dict[str, Any]:
         """Returns the check as it stands in a document; a value that is not finite becomes null."""
-        value = float(self.value) if math.isfinite(self.value) else None
-        return {
-            "name": self.name,
-            "value": value,
-            "limit": float(self.limit),
-            "comparison": self.comparison,
-            "ok": self.ok,
-        }
+        value = float(self.value) if is_finite(self.value) else None
+        held = {"limit": float(self.limit), "comparison": self.comparison, "ok": self.ok}
+        return {"name": self.name, "value": value, **held}

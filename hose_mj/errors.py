@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+import math
+import re
 from collections.abc import Collection
 from typing import Self
 
@@ -11,7 +14,7 @@ class HoseError(Exception):
 
 
 class InputError(HoseError, ValueError):
-    """A value outside its valid set.
+    """A value outside its valid set; the message suggests the valid word that a text comes near to.
 
     Args:
         thing: what was given, in the user's words (``"bending_stiffness"``).
@@ -21,7 +24,7 @@ class InputError(HoseError, ValueError):
 
     def __init__(self, thing: str, value: object, valid: str) -> None:
         self.thing, self.value, self.valid = thing, value, valid
-        super().__init__(f"{thing} is {value!r}; valid: {valid}")
+        super().__init__(f"{thing} is {_show(value)}; valid: {valid}{_suggest(value, valid)}")
 
     @classmethod
     def about(cls, sentence: str) -> Self:
@@ -41,5 +44,30 @@ class StepError(HoseError, RuntimeError):
 
 def check_choice(name: str, value: object, valid: Collection[str]) -> None:
     """Raises `InputError` unless `value` is one of the valid words."""
-    if value not in valid:
+    if not isinstance(value, str) or value not in valid:
         raise InputError(name, value, "one of " + ", ".join(valid))
+
+
+def is_finite(value: object) -> bool:
+    """Says whether a value is a number that a float holds; text, 1j and 10**400 are none."""
+    try:
+        return math.isfinite(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _show(value: object) -> str:
+    """The value as Python writes it, if Python does: a whole number may have too many digits."""
+    try:
+        return repr(value)
+    except Exception:
+        return f"a value of type {type(value).__name__}"
+
+
+def _suggest(value: object, valid: str) -> str:
+    """What a misspelt word may have meant, out of those that are valid."""
+    if not isinstance(value, str):
+        return ""
+    known = re.findall(r"[\w.-]+", valid.partition(" (")[0])  # there stands why
+    near = difflib.get_close_matches(value, known, n=1, cutoff=0.7)
+    return f" (did you mean {near[0]}?)" if near and near[0] != value else ""

@@ -3,8 +3,6 @@
 Whoever needs one says so before any work is done, with `require`.
 """
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Sequence
 

@@ -7,8 +7,6 @@ A kernel that serves hoses in a plane and in space takes `axes`, a tuple of two 
 length is part of its type, so one source compiles into one specialised version for each.
 """
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import importlib.util
@@ -38,8 +36,7 @@ _OPTIONS: dict[str, Any] = {
 _PACKAGE = Path(__file__).resolve().parent
 _ENVIRONMENT = "_ZN08NumbaEnv"
 _DECLARE = '@"{}" = common global i64 0\n'
-_MADE: set[Any] = set()
-"""What `_decorate` made, to tell ours from other people's."""
+_MADE: set[Any] = set()  # what `_decorate` made, to tell ours from other people's
 
 
 def _keep_known(**options: bool) -> dict[str, bool]:

@@ -3,8 +3,6 @@
 Importing one gives the module that took its place and a DeprecationWarning that says which.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 import warnings

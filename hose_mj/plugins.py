@@ -9,14 +9,15 @@ Groups: `hose_mj.hoses`, `hose_mj.tasks`, `hose_mj.scenes`, `hose_mj.cases`,
 `hose_learning.learners`. Registries ask for plug-ins only after their own names, which so win.
 """
 
-from __future__ import annotations
-
 import re
-from collections.abc import Collection
+import warnings
+from collections.abc import Callable, Collection, Mapping
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, TypeVar
 
 from hose_mj.errors import InputError
+
+Entry = TypeVar("Entry")
 
 
 def find_plugins(group: str, own: Collection[str] = ()) -> dict[str, EntryPoint]:
@@ -66,6 +67,20 @@ def load_plugin(entry: EntryPoint, kind: type | tuple[type, ...] = object) -> An
         kinds = kind if isinstance(kind, tuple) else (kind,)
         wanted = " or ".join(f"a {each.__name__}" for each in kinds)
         raise InputError(_describe(entry), loaded, wanted)
+    return loaded
+
+
+def load_plugins(found: Mapping[str, Entry], load: Callable[[Entry], Any]) -> dict[str, Any]:
+    """Returns what `load` makes of each entry point, by name, for lists of all there is.
+
+    One that `load` refuses is left out, with a RuntimeWarning that says which and why.
+    """
+    loaded = {}
+    for name, entry in found.items():
+        try:
+            loaded[name] = load(entry)
+        except InputError as error:
+            warnings.warn(f"{name} is left out: {error}", RuntimeWarning, stacklevel=3)
     return loaded
 
 

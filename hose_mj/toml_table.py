@@ -13,18 +13,13 @@ from typing import Any
 
 from hose_mj.errors import InputError
 
-LARGEST_FILE = 1_000_000
-"""Bytes; a description of a hose has some hundred."""
+LARGEST_FILE = 1_000_000  # bytes; a description of a hose has some hundred
 LARGEST_NUMBER = 1e15
 _SHOWN = 80
 
 
 def read_toml(path: Path) -> TomlTable:
-    """Reads a TOML file.
-
-    Raises:
-        InputError: a file that cannot be read or is not TOML.
-    """
+    """Reads a TOML file; `InputError` for a file that cannot be read or is not TOML."""
     try:
         with open(path, "rb") as stream:
             data = stream.read(LARGEST_FILE + 1)

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from hose_mj.cli.main import main
 from hose_mj.errors import InputError
 from hose_mj.plugins import find_plugins, load_plugin
 
@@ -101,13 +102,39 @@ def test_a_broken_task_of_others_leaves_runs_of_ours_alone(folder):
     from hose_learning.study.run_folder import describe
     from hose_learning.study.training import Training
 
-    from hose_mj.tasks.registry import list_tasks, make_task
+    from hose_mj.tasks.registry import TASKS, find_task, list_tasks, make_task
 
     install(folder, "swarm", "bee = no_such_module:BEE", group="hose_mj.tasks")
     with pytest.raises(InputError, match="package swarm"):
-        list_tasks()
+        find_task("bee")
+    with pytest.warns(RuntimeWarning, match="bee is left out: .*package swarm.*no_such_module"):
+        assert list(list_tasks()) == list(TASKS)
     task = make_task("maze")
     training = Training(
         task, "q-learning", make_settings("q-learning", task), np.random.default_rng(0)
     )
     assert describe(training, 0)["task"] == "maze"
+
+
+@pytest.mark.filterwarnings("always::RuntimeWarning")
+@pytest.mark.parametrize(
+    ("kind", "group", "ours"),
+    [
+        ("models", "hose_mj.hoses", "geds"),
+        ("tasks", "hose_mj.tasks", "taxi"),
+        ("learners", "hose_learning.learners", "usap"),
+        ("scenes", "hose_mj.scenes", "floor_1"),
+    ],
+)
+def test_a_broken_plugin_is_one_line_beside_the_list_of_the_others(
+    folder, capsys, kind, group, ours
+):
+    install(folder, "swarm", "bee = no_such_module:BEE", group=group)
+    assert main(["list", kind]) == 0
+    captured = capsys.readouterr()
+    assert f"\n{ours} " in f"\n{captured.out}"
+    assert captured.err.startswith("hose-mj: warning: bee is left out: entry point 'bee'")
+    assert "No module named 'no_such_module'" in captured.err
+    assert captured.err.count("\n") == 1
+    assert main(["list", kind, "--quiet"]) == 0
+    assert not capsys.readouterr().err

@@ -8,19 +8,19 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
-from hose_mj.cli.results import check_choice, check_counts, finish
+from hose_mj.cli.results import check_counts, finish
 from hose_mj.constraints.limits import Limits
-from hose_mj.errors import InputError
-from hose_mj.rollout.break_sequences import Ending, EndingsFile, Move, draw_sequences, play_all
-from hose_mj.scenes.mjcf.scene import find_scene, read_scene
-from hose_mj.world.initial_shape import count_control_points
+from hose_mj.errors import InputError, check_choice
 from hose_mj.world.registry import WORLDS, make_world
+
+if TYPE_CHECKING:
+    from hose_mj.rollout.break_sequences import Ending, Move
 
 AGREE = 0.9
 QUICK = 20
@@ -40,28 +40,26 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional] = "floor_2"
     """A shipped scene, or your own MJCF file."""
-    models: tuple[str, ...] = ("geds", "cable", "flex")
-    """Hose models; each is compared with each."""
-    sequences: int = 200
-    """How many sequences of moves."""
-    moves: int = 24
-    """Moves in a sequence at most."""
-    quick: bool = False
-    """Play 20 sequences, with geds and flex."""
+    models: tuple[str, ...] = ("geds", "cable", "flex")  # Hose models; each is compared with each.
+    sequences: int = 200  # How many sequences of moves.
+    moves: int = 24  # Moves in a sequence at most.
+    quick: bool = False  # Play 20 sequences, with geds and flex.
     control_points: int | None = None
     """Control points of geds; by default twice as many as its world takes by itself, see docs."""
     max_tension: float | None = None
     """Tension that breaks a segment (N); by default the rule of the constraints."""
     out: Path | None = None
     """Folder to keep the endings in; the command goes on from those that are there."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the moves."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the moves.
 
 
 def run(args: Args) -> int:
     """Plays all sequences; 1 if two models agree in less than 90 % of them."""
+    from hose_mj.rollout.break_sequences import EndingsFile, draw_sequences, play_all
+    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+    from hose_mj.world.initial_shape import count_control_points
+
     check_counts(args, sequences=1, moves=1, seed=0)
     if len(set(args.models)) < max(2, len(args.models)):
         raise InputError("models", args.models, "at least two, each once")

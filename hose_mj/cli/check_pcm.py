@@ -4,29 +4,24 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 import tyro
-from hose_learning.mdp.partially_constrained import (
-    PAIRS,
-    PROPERTIES,
-    Pair,
-    PcmViolation,
-    Propositions,
-    WrittenPair,
-    compute_propositions,
-    find_violations,
-    make_tasks,
-    write_pair,
-)
 
 from hose_mj.checks import Check
-from hose_mj.cli.results import check_choice, check_counts, finish
+from hose_mj.cli.results import check_counts, finish
 from hose_mj.cli.task_options import read_options
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.recording.files import write_atomically
+
+if TYPE_CHECKING:
+    from hose_learning.mdp.partially_constrained import (
+        Pair,
+        PcmViolation,
+        Propositions,
+        WrittenPair,
+    )
 
 
 @dataclass(frozen=True)
@@ -40,40 +35,35 @@ class Args:
 
     source: Annotated[str | None, tyro.conf.Positional] = None
     """Id of the task that is learnt first."""
-    target: Annotated[str | None, tyro.conf.Positional] = None
-    """Id of the task that is wanted."""
+    target: Annotated[str | None, tyro.conf.Positional] = None  # Id of the task that is wanted.
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Options of both tasks, or of one: source.NAME=VALUE, target.NAME=VALUE."""
-    example: str | None = None
-    """A ready pair instead of two tasks."""
-    list: bool = False
-    """List the ready pairs."""
+    example: str | None = None  # A ready pair instead of two tasks.
+    list: bool = False  # List the ready pairs.
     reading: Literal["equal", "signs"] = "equal"
     """Property 4 compares rewards of undesired states, or their signs only."""
-    discount: float = 0.9
-    """Discount gamma of the values that Proposition 5 is about."""
-    limit: int = 100_000
-    """Largest number of states of a task."""
-    out: Path | None = None
-    """Folder for a picture of a PCM's values."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the start, where it is random."""
+    discount: float = 0.9  # Discount gamma of the values that Proposition 5 is about.
+    limit: int = 100_000  # Largest number of states of a task.
+    out: Path | None = None  # Folder for a picture of a PCM's values.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the start, where it is random.
 
 
 def run(args: Args) -> int:
     """Checks a pair; 1 if it is not a PCM."""
+    import numpy as np
+    from hose_learning.mdp import partially_constrained as pcm
+
     if args.list:
         return list_pairs(args)
     check_counts(args, seed=0)
     if not 0.0 <= args.discount < 1.0:
         raise InputError("discount", args.discount, "a number from 0 up to, but not including, 1")
     pair = choose_pair(args)
-    written = write_pair(*make_tasks(pair), np.random.default_rng(args.seed), args.limit)
+    written = pcm.write_pair(*pcm.make_tasks(pair), np.random.default_rng(args.seed), args.limit)
     models = (written.source.model, written.target.model, written.projection)
-    violations = find_violations(*models, args.reading)
-    propositions = None if violations else compute_propositions(*models, args.discount)
+    violations = pcm.find_violations(*models, args.reading)
+    propositions = None if violations else pcm.compute_propositions(*models, args.discount)
     checks = make_checks(violations, propositions)
     if args.out is not None and propositions is not None:
         title = args.example or f"{args.source} to {args.target}"
@@ -90,6 +80,8 @@ def choose_pair(args: Args) -> Pair:
     Raises:
         InputError: an unknown example, an example with tasks or options, or tasks left out.
     """
+    from hose_learning.mdp.partially_constrained import PAIRS, Pair
+
     if args.example is not None:
         check_choice("example", args.example, PAIRS)
         if args.source is not None or args.set:
@@ -104,6 +96,8 @@ def choose_pair(args: Args) -> Pair:
 
 def make_checks(violations: list[PcmViolation], propositions: Propositions | None) -> list[Check]:
     """Makes the checks: four properties, and for a PCM the two propositions."""
+    from hose_learning.mdp.partially_constrained import PROPERTIES
+
     counts = {violation.number: violation.count for violation in violations}
     checks = [
         Check(f"property {number}: exceptions ({says})", counts.get(number, 0), 0, "==")
@@ -156,6 +150,8 @@ def make_results(
 
 def list_pairs(args: Args) -> int:
     """Prints the ready pairs."""
+    from hose_learning.mdp.partially_constrained import PAIRS
+
     if args.json:
         pairs = [{"name": name, **asdict(pair)} for name, pair in PAIRS.items()]
         print_document(make_document("check-pcm", args, results={"pairs": pairs}))
@@ -184,6 +180,8 @@ def _summarize(
 
 def draw_values(title: str, propositions: Propositions) -> bytes:
     """Returns the PNG: the bound of each target state and what greedy transfer gets, over V_t*."""
+    import numpy as np
+
     from hose_mj.recording.palette import OTHERS, format_hex
     from hose_mj.recording.plots.style import SOFT, add_legend, encode_png, make_axes
 

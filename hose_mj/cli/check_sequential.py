@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 import tyro
-from hose_learning.mdp.sequential_realization import (
-    PROPERTIES,
-    SequentialStudy,
-    study_sequential,
-)
 
 from hose_mj.checks import Check
 from hose_mj.cli.results import check_counts, finish
 from hose_mj.cli.task_options import parse_options
 from hose_mj.tasks.registry import make_task
-from hose_mj.tasks.stream import make_stream
+
+if TYPE_CHECKING:
+    from hose_learning.mdp.sequential_realization import SequentialStudy
 
 
 @dataclass(frozen=True)
@@ -30,24 +26,23 @@ class Args:
     witness: the state, the action, and what comes of both.
     """
 
-    task: Annotated[str, tyro.conf.Positional]
-    """Id of the task."""
+    task: Annotated[str, tyro.conf.Positional]  # Id of the task.
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Options of the task."""
-    idle: str = "none"
-    """The action that stands for none."""
-    sharing: Literal["team", "each"] = "team"
-    """Compare the team's reward, or what each agent gets."""
-    limit: int = 100_000
-    """Largest number of states."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the start, where it is random."""
+    idle: str = "none"  # The action that stands for none.
+    sharing: Literal["team", "each"] = "team"  # Compare the team's reward, or what each agent gets.
+    limit: int = 100_000  # Largest number of states.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the start, where it is random.
 
 
 def run(args: Args) -> int:
     """Checks a task; 1 if a property does not hold."""
+    import numpy as np
+    from hose_learning.mdp.sequential_realization import PROPERTIES, study_sequential
+
+    from hose_mj.tasks.stream import make_stream
+
     check_counts(args, seed=0)
     task = make_task(args.task, **parse_options(args.set))
     start = task.reset(make_stream(np.random.default_rng(args.seed)))

@@ -27,16 +27,12 @@ class Args:
     those of the thesis (Table 8.2).
     """
 
-    task: Annotated[str, tyro.conf.Positional] = "taxi"
-    """Id of the task."""
-    cycles: int = 2002
-    """Moves of each agent in a log."""
+    task: Annotated[str, tyro.conf.Positional] = "taxi"  # Id of the task.
+    cycles: int = 2002  # Moves of each agent in a log.
     logs: int = 8
     """Logs: the first is measured in full, the others once, to see how much logs differ."""
-    repeats: int = 10
-    """How often the folds of the first log are drawn anew."""
-    folds: int = 10
-    """Parts of the log, each of which is tested on once in every repeat."""
+    repeats: int = 10  # How often the folds of the first log are drawn anew.
+    folds: int = 10  # Parts of the log, each of which is tested on once in every repeat.
     action: Literal["integer", "one-hot"] = "integer"
     """The action as one attribute, its number, or as an attribute for each action."""
     cells: Literal["coordinates", "number"] = "coordinates"
@@ -45,10 +41,8 @@ class Args:
     """Clusters become classes one to one, or each by the majority of its instances."""
     out: Path | None = None
     """Folder for the log, the records and a plot; nothing is written without it."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the moves, the folds and the classifiers."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the moves, the folds and the classifiers.
 
 
 def run(args: Args) -> int:

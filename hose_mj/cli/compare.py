@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 MODELS = ("geds", "cable", "flex", "hinge-chain")
 OUT = Path("out/compare")
-QUICK_SHARE = 1.0 / 3.0
-"""Of its budget that a user's hose gets with --quick."""
+QUICK_SHARE = 1.0 / 3.0  # of its budget that a user's hose gets with --quick
 _MY_HOSE = tyro.conf.arg(metavar="[MY_HOSE.toml]")
 
 
@@ -55,10 +54,8 @@ class Args:
     quick: bool = False
     """A smaller grid, about two minutes once compiled. For your own hose:
     a third of its budget."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the random states."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the random states.
 
 
 def run(args: Args) -> int:
@@ -123,14 +120,9 @@ def prepare_cases(args: Args) -> Callable[[Callable[[str], None]], Study]:
     models = tuple(m for m in dict.fromkeys(args.models) if m != "cable" or not left_out)
 
     def measure(advance: Callable[[str], None]) -> Study:
-        study = run_study(
-            cases,
-            models,
-            quick=args.quick,
-            seed=args.seed,
-            with_numerics=not args.cases and "geds" in models,
-            advance=advance,
-        )
+        numerics = not args.cases and "geds" in models
+        options: Any = {"quick": args.quick, "seed": args.seed, "with_numerics": numerics}
+        study = run_study(cases, models, **options, advance=advance)
         study.committed = read_committed_cable(cases) if left_out else None
         return study
 

@@ -14,8 +14,7 @@ import tyro
 
 from hose_mj.cli.commands import COMMANDS
 from hose_mj.cli.listing import KINDS
-from hose_mj.cli.results import check_choice
-from hose_mj.errors import HoseError
+from hose_mj.errors import HoseError, check_choice
 from hose_mj.recording.document import make_document, print_document
 
 NAMED = {
@@ -68,10 +67,8 @@ class Args:
     fish: hose-mj completion fish > ~/.config/fish/completions/hose-mj.fish
     """
 
-    shell: Annotated[str, tyro.conf.Positional]
-    """bash, zsh or fish."""
-    json: bool = False
-    """Print the words as one JSON document instead of a script."""
+    shell: Annotated[str, tyro.conf.Positional]  # bash, zsh or fish.
+    json: bool = False  # Print the words as one JSON document instead of a script.
 
 
 def run(args: Args) -> int:

@@ -15,12 +15,9 @@ from hose_mj.recording.files import write_atomically
 if TYPE_CHECKING:
     from hose_learning.consensus import ConsensusTrial
 
-LOSSES = (0.0, 0.1, 0.5)
-"""Shares of lost messages that are always tried, beside the one asked for."""
-LARGEST_SPREAD = 0.05
-"""Disagreement that counts as agreement, in turns."""
-SCATTER = 1.2
-"""What chance may add to a disagreement measured over so many turns."""
+LOSSES = (0.0, 0.1, 0.5)  # shares of lost messages that are always tried, beside the one asked for
+LARGEST_SPREAD = 0.05  # disagreement that counts as agreement, in turns
+SCATTER = 1.2  # what chance may add to a disagreement measured over so many turns
 
 
 @dataclass(frozen=True)
@@ -32,30 +29,21 @@ class Args:
     of turns is kept and that no two agents act at once. Times are in turns.
     """
 
-    agents: int = 4
-    """Number of agents."""
-    loss: float = 0.1
-    """Probability that a message is lost."""
+    agents: int = 4  # Number of agents.
+    loss: float = 0.1  # Probability that a message is lost.
     delay: int = 1
     """Largest delay of a message, in rounds of messages; each has a random one up to it."""
-    drift: float = 0.02
-    """Largest relative error of a clock's rate."""
-    rounds: int = 50
-    """Rounds of messages in one turn."""
-    action_time: float = 0.5
-    """Longest action, in turns; durations are random up to it."""
+    drift: float = 0.02  # Largest relative error of a clock's rate.
+    rounds: int = 50  # Rounds of messages in one turn.
+    action_time: float = 0.5  # Longest action, in turns; durations are random up to it.
     wait: bool = False
     """Let each turn run out instead of giving it to the next agent when the action is done."""
     falls_back: bool = False
     """Let clocks fall back below a turn that they have reached, as the thesis has it."""
-    turns: int = 60
-    """Turns to play."""
-    out: Path = Path("out/consensus")
-    """Folder for the picture."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of everything random."""
+    turns: int = 60  # Turns to play.
+    out: Path = Path("out/consensus")  # Folder for the picture.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of everything random.
 
 
 def run(args: Args) -> int:

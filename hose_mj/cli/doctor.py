@@ -49,28 +49,19 @@ CABLE_SCENE = """
 class Args:
     """Check that this installation has what hose_mj needs."""
 
-    json: bool = False
-    """Print one JSON document instead of the table."""
+    json: bool = False  # Print one JSON document instead of the table.
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked for.
+    """One thing that was looked for."""
 
-    Attributes:
-        name: what was looked for.
-        value: what was found.
-        limit: what is wanted.
-        satisfied: whether the one satisfies the other.
-        remedy: what to do if not.
-        required: True if nothing works without it, False if only an optional part suffers.
-    """
-
-    name: str
-    value: str
-    limit: str
-    satisfied: bool
-    remedy: str
+    name: str  # what was looked for
+    value: str  # what was found
+    limit: str  # what is wanted
+    satisfied: bool  # whether the one satisfies the other
+    remedy: str  # what to do if not
+    # True if nothing works without it, False if only an optional part suffers.
     required: bool = True
 
     @property

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
 import queue
 import sys
 import time
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
 
-from hose_mj.cli.results import check_choice
-from hose_mj.constraints.monitor import Monitor
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.recording.document import make_document, print_document
-from hose_mj.rollout.episode import is_at_goal
-from hose_mj.rollout.video import draw_hose
-from hose_mj.world.driving import Driver
 from hose_mj.world.registry import WORLDS, make_world
-from hose_mj.world.world import World
+
+if TYPE_CHECKING:
+    from hose_mj.world.world import World
 
 SPACE, BACKSPACE = 32, 259
 ARROWS = {265: (0, 1, 0), 264: (0, -1, 0), 263: (-1, 0, 0), 262: (1, 0, 0)}
@@ -43,8 +40,7 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional]
     """A shipped scene (floor_1 to floor_6, corridor, deck, lift), or your own MJCF file."""
-    model: str = "geds"
-    """The hose's model: geds, cable or flex."""
+    model: str = "geds"  # The hose's model: geds, cable or flex.
     json: bool = False
     """Print one JSON document on stdout when the window is closed; messages go to stderr."""
 
@@ -62,6 +58,9 @@ class Desk:
     """
 
     def __init__(self, world: World, tell: Any = print) -> None:
+        from hose_mj.constraints.monitor import Monitor
+        from hose_mj.world.driving import Driver
+
         self.world, self._tell = world, tell
         self.monitor = Monitor(world)
         self.driver = Driver(world)
@@ -76,6 +75,8 @@ class Desk:
 
     def advance(self, duration: float) -> None:
         """Does what the keys say, then goes on for a simulated time (s)."""
+        from hose_mj.rollout.episode import is_at_goal
+
         while not self._keys.empty():
             self._obey(self._keys.get())
         for _ in range(max(1, round(duration / self.world.timestep))):
@@ -97,8 +98,8 @@ class Desk:
                 self.robot = robot
                 self._tell(f"robot {robot}: {self.world.scene.robots[robot].name}")
         elif key in ARROWS or key in HEIGHT:
-            step = np.array((ARROWS | HEIGHT)[key])
-            self.driver.targets[self.robot] += step * self.world.scene.cell_size
+            for axis, cells in enumerate((ARROWS | HEIGHT)[key]):
+                self.driver.targets[self.robot, axis] += cells * self.world.scene.cell_size
         elif key == SPACE:
             self.driver.drive_to(self.world.site_positions()[:-1])
         elif key == BACKSPACE:
@@ -127,8 +128,10 @@ def _show(desk: Desk) -> None:
     """Runs in real time until the window is closed."""
     import mujoco.viewer
 
+    from hose_mj.rollout.video import draw_hose
+
     world = desk.world
-    gravity = float(np.linalg.norm(world.model.opt.gravity))
+    gravity = math.hypot(*world.model.opt.gravity)
     limit = desk.monitor.limits.compute_tension_limit(world.scene.spec, gravity)
     span = 1.0 / PICTURES_PER_SECOND
     with mujoco.viewer.launch_passive(

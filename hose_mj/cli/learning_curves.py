@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
 import tyro
-from hose_learning.learners import catalog
-from hose_learning.study.training import Episodes
 
 from hose_mj.cli import train
 from hose_mj.cli.progress import show_progress
 from hose_mj.cli.results import check_counts
 from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
-from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.recording.files import write_atomically
-from hose_mj.recording.plots.curves import Curve, Panel, plot_learning
-from hose_mj.tasks.task import Task
 
-Measured = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+    from hose_learning.study.training import Episodes
+
+    from hose_mj.recording.plots.curves import Panel
+    from hose_mj.tasks.task import Task
+
+Measured: TypeAlias = "npt.NDArray[np.float64]"
 
 
 @dataclass(frozen=True)
@@ -54,32 +55,26 @@ class Args(train.LearnerArgs):
     are not given are those of `hose-mj train`.
     """
 
-    task: Annotated[str, tyro.conf.Positional] = "line"
-    """A task (hose-mj train --list names all)."""
-    learners: tuple[str, ...] = ("d-rr-ql",)
-    """The learners to compare."""
-    measures: tuple[str, ...] = ("success",)
-    """What to draw, a panel each: success, moves, return."""
+    task: Annotated[str, tyro.conf.Positional] = "line"  # A task (hose-mj train --list names all).
+    learners: tuple[str, ...] = ("d-rr-ql",)  # The learners to compare.
+    measures: tuple[str, ...] = ("success",)  # What to draw, a panel each: success, moves, return.
     options: tuple[str, ...] = ()
     """Options of the learners' own: trace_decay=0.8 for all, usap.classifier=forest for one."""
-    episodes: int = 2_000
-    """Episodes of each training."""
-    bins: int = 50
-    """Points of each line."""
-    seeds: int = 5
-    """Trainings of each learner."""
-    title: str | None = None
-    """Above the picture; by default the task and its options."""
-    save: Path = Path("out/curves.png")
-    """The picture (PNG)."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """The first seed; the others follow it."""
+    episodes: int = 2_000  # Episodes of each training.
+    bins: int = 50  # Points of each line.
+    seeds: int = 5  # Trainings of each learner.
+    title: str | None = None  # Above the picture; by default the task and its options.
+    save: Path = Path("out/curves.png")  # The picture (PNG).
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # The first seed; the others follow it.
 
 
 def run(args: Args) -> int:
     """Trains and draws; 0 when done."""
+    import numpy as np
+
+    from hose_mj.recording.plots.curves import plot_learning
+
     check_arguments(args)
     measured: dict[str, list[dict[str, Measured]]] = {id: [] for id in args.learners}
     with show_progress(f"{args.task}", args.seeds * len(args.learners)) as show:
@@ -105,6 +100,8 @@ def run(args: Args) -> int:
 
 def check_arguments(args: Args) -> None:
     """Raises `InputError` for a number or a name outside its valid set."""
+    from hose_learning.learners import catalog
+
     check_counts(args, episodes=1, bins=1, seeds=1, seed=0)
     if args.bins > args.episodes:
         raise InputError("bins", args.bins, f"at most one for each of {args.episodes} episodes")
@@ -120,6 +117,10 @@ def check_arguments(args: Args) -> None:
 
 def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
     """Trains once; returns the mean of each measure in each bin (bins,)."""
+    import numpy as np
+
+    from hose_mj.jit import compile_notice
+
     given = {field.name: getattr(args, field.name) for field in fields(train.LearnerArgs)}
     # Its own options, without its name, and those that name none.
     ours = (word.removeprefix(f"{learner}.") for word in args.options)
@@ -137,6 +138,10 @@ def measure(args: Args, learner: str, seed: int) -> dict[str, Measured]:
 
 def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measured]]]) -> Panel:
     """Makes the panel of one measure: means over the seeds, from the lowest to the highest."""
+    import numpy as np
+
+    from hose_mj.recording.plots.curves import Curve, Panel
+
     curves = {}
     for learner, runs in measured.items():
         values = np.stack([run[name] for run in runs])  # (seeds, bins)
@@ -146,6 +151,8 @@ def make_panel(name: str, x: Measured, measured: dict[str, list[dict[str, Measur
 
 def list_records(measures: Sequence[str], panels: Sequence[Panel]) -> list[dict[str, Any]]:
     """Lists what was drawn as plain values, one record for each line."""
+    import numpy as np
+
     return [
         {
             "measure": name,

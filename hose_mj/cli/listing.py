@@ -10,7 +10,7 @@ from typing import Annotated
 
 import tyro
 
-from hose_mj.cli.results import check_choice
+from hose_mj.errors import check_choice
 from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
 
@@ -21,8 +21,7 @@ class Args:
 
     kind: Annotated[str, tyro.conf.Positional]
     """scenes, hoses, materials, models, policies, tasks, learners or environments."""
-    json: bool = False
-    """Print one JSON document on stdout."""
+    json: bool = False  # Print one JSON document on stdout.
 
 
 def run(args: Args) -> int:
@@ -49,14 +48,15 @@ def list_scenes() -> dict[str, str]:
     """Shipped scenes; the line is the comment that the file begins with."""
     import re
 
-    from hose_mj.scenes.mjcf import scene
+    from hose_mj.plugins import load_plugins
+    from hose_mj.scenes.mjcf.catalogue import find_scene, list_scenes
 
-    found = {}
-    for name in scene.list_scenes():
-        comment = re.search(r"<!--(.*?)-->", scene.find_scene(name).read_text("utf-8"), re.S)
+    def read_title(name: str) -> str:
+        comment = re.search(r"<!--(.*?)-->", find_scene(name).read_text("utf-8"), re.S)
         text = " ".join(comment.group(1).split()) if comment else ""
-        found[name] = re.split(r"(?<=[.:;])\s", text)[0].rstrip(".:;")
-    return found
+        return re.split(r"(?<=[.:;])\s", text)[0].rstrip(".:;")
+
+    return load_plugins({name: name for name in list_scenes()}, read_title)
 
 
 def list_hoses() -> dict[str, str]:

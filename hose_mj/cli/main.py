@@ -10,9 +10,12 @@ import re
 import shutil
 import sys
 import textwrap
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, nullcontext, redirect_stderr, redirect_stdout, suppress
-from typing import Any, Protocol, TextIO, cast
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Protocol, TextIO, cast, get_args, get_type_hints
 
 import hose_mj
 from hose_mj.cli.commands import COMMANDS, GROUPS, Command
@@ -34,7 +37,7 @@ class CommandModule(Protocol):
     """What the module of a sub-command defines.
 
     Attributes:
-        Args: frozen dataclass of its arguments; its docstrings are the `--help`.
+        Args: frozen dataclass of its arguments; what is said of them is the `--help`.
         run: takes an `Args` and returns the exit status.
     """
 
@@ -51,7 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if sys.stdout is None or sys.stderr is None:  # closed by whoever started this
         sys.stdout, sys.stderr = sys.stdout or _open_nothing(), sys.stderr or _open_nothing()
-    status = _run_reporting(words)
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        status = _run_reporting(words)
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -69,7 +74,7 @@ def _run_reporting(words: list[str]) -> int:
     try:
         return run_command(words)
     except HoseError as error:
-        _complain(f"{error}{_suggest(error)}")
+        _complain(str(error))
         return BAD_INPUT
     except ModuleNotFoundError as error:
         extra = find_extra(error.name or "")
@@ -104,6 +109,11 @@ def _complain(text: str) -> None:
         print(f"hose-mj: error: {text}", file=sys.stderr)
 
 
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    with suppress(OSError):
+        print(f"hose-mj: warning: {' '.join(str(message).split())}", file=sys.stderr)
+
+
 def _describe_refusal(error: OSError) -> str:
     """The system's reason, with the file that it is about if it says so; one line."""
     names = [str(name) for name in (error.filename, error.filename2) if name is not None]
@@ -119,17 +129,6 @@ def _can_print() -> bool:
         _drop_output()
         return False
     return True
-
-
-def _suggest(error: HoseError) -> str:
-    """What a misspelt word may have meant, out of those that the error calls valid."""
-    if not isinstance(error, InputError) or not isinstance(error.value, str):
-        return ""
-    import difflib
-
-    known = re.findall(r"[\w.-]+", error.valid)
-    near = difflib.get_close_matches(error.value, known, n=1, cutoff=0.7)
-    return f" (did you mean {near[0]}?)" if near and near[0] != error.value else ""
 
 
 def _open_nothing() -> TextIO:
@@ -153,7 +152,11 @@ def run_command(words: Sequence[str]) -> int:
         InputError: there is no such sub-command.
         SystemExit: after --help or arguments that do not parse.
     """
-    name = words[0] if words else None
+    quiet = "--quiet" in words
+    words = [word for word in words if word != "--quiet"]
+    name, rest = (words[0], words[1:]) if words else (None, [])
+    if name == "help":
+        name, rest = (rest[0], ["--help"]) if rest else ("--help", [])
     if name in (None, "-h", "--help"):
         print(make_help(), file=sys.stdout if words else sys.stderr, end="")
         return DONE if words else BAD_INPUT
@@ -162,14 +165,13 @@ def run_command(words: Sequence[str]) -> int:
         return DONE
     if name not in COMMANDS:
         what = "option" if name.startswith("-") else "command"
-        known = "--help, --version" if what == "option" else ", ".join(COMMANDS)
+        known = "--help, --version, --quiet" if what == "option" else ", ".join(COMMANDS)
         raise InputError(what, name, known)
     command = COMMANDS[name]
-    quiet = "--quiet" in words
-    rest = [word for word in words[1:] if word != "--quiet"]
     with redirect_stderr(io.StringIO()) if quiet else nullcontext():
         rest = rename_options(name, command, rest)
     module = cast(CommandModule, importlib.import_module(command.module))
+    check_paths(module.Args, rest)
     args = parse_arguments(name, module.Args, rest)
     require_all(command.needs, f"hose-mj {name}")
     with ExitStack() as stack:
@@ -215,6 +217,18 @@ def _are_several(values: Sequence[str], known: Sequence[str]) -> bool:
     return len(values) > 1 and set(values) <= set(known)
 
 
+def check_paths(arguments: type[Any], words: Sequence[str]) -> None:
+    """Raises `InputError` for an option's empty path, which Python takes for the current folder."""
+    parts = [
+        part for word in words for part in (word.split("=", 1) if word[:2] == "--" else [word])
+    ]
+    kinds = get_type_hints(arguments)
+    for word, value in pairwise(parts):
+        kind = kinds.get(word[2:].replace("-", "_"))
+        if word[:2] == "--" and not value and Path in (kind, *get_args(kind)):
+            raise InputError(word, value, "a path that is not empty")
+
+
 def parse_arguments(name: str, arguments: type[Any], words: Sequence[str]) -> Any:
     """Returns the `Args` of a sub-command that its words describe."""
     import tyro
@@ -239,20 +253,32 @@ def _finish_help(name: str, text: str) -> str:
     lines = [line for line in text.splitlines() if not re.fullmatch(r"[│|]\s+[│|]", line)]
     lines = [line if line[:1] in "│╭╰|+" else _wrap(line) for line in lines]
     examples = COMMANDS[name].examples if name in COMMANDS else ()
-    lines += ["", "examples:", *(f"  {line}" for line in examples), ""] if examples else []
+    if examples:
+        lines += ["", "examples:", *map(_wrap_command, examples), ""]
     return "\n".join([*lines, _wrap(ENDING), ""])
 
 
 def _wrap(text: str) -> str:
     """Returns paragraphs that fit into the terminal."""
-    width = min(100, max(40, shutil.get_terminal_size().columns))
-    return "\n\n".join(textwrap.fill(" ".join(one.split()), width) for one in text.split("\n\n"))
+    parts = (" ".join(one.split()) for one in text.split("\n\n"))
+    return "\n\n".join(textwrap.fill(part, _find_width()) for part in parts)
+
+
+def _wrap_command(line: str) -> str:
+    """Returns a command line that a shell takes as it stands, in lines that fit."""
+    style: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
+    parts = textwrap.wrap(line, _find_width() - 6, **style)
+    return "  " + " \\\n    ".join(parts)
+
+
+def _find_width() -> int:
+    return min(100, max(40, shutil.get_terminal_size().columns))
 
 
 def make_help() -> str:
     """Returns the help of the program: the commands, by what they are for."""
     indent = 4 + max(map(len, COMMANDS))
-    width = min(100, max(50, shutil.get_terminal_size().columns))
+    width = _find_width()
     about = (hose_mj.__doc__ or "").splitlines()[0]
     lines = ["usage: hose-mj COMMAND [ARGUMENTS]", "       hose-mj COMMAND --help", ""]
     lines += [*textwrap.wrap(about, width), "", "commands:"]

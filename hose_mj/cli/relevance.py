@@ -6,26 +6,19 @@ import time
 from collections import Counter
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
-from hose_learning.experience import record_experience
-from hose_learning.relevance import (
-    Relevance,
-    count_unexplained,
-    find_relevance,
-    list_candidates,
-    list_signals,
-)
 
 from hose_mj.checks import Check
 from hose_mj.cli.results import check_counts, finish, print_table
 from hose_mj.cli.task_options import parse_options
 from hose_mj.tasks.registry import make_task
 
-WIDEST = 6
-"""Most signals that stand side by side."""
+if TYPE_CHECKING:
+    from hose_learning.relevance import Relevance
+
+WIDEST = 6  # most signals that stand side by side
 
 
 @dataclass(frozen=True)
@@ -36,46 +29,38 @@ class Args:
     variables found are checked against a fresh log, in which they must tell every event.
     """
 
-    task: Annotated[str, tyro.conf.Positional]
-    """Id of the task."""
-    moves: int = 10_000
-    """Random moves of single agents to log."""
-    set: tuple[str, ...] = ()
-    """Options of the task, as n_robots=3 goal=(2,1)."""
+    task: Annotated[str, tyro.conf.Positional]  # Id of the task.
+    moves: int = 10_000  # Random moves of single agents to log.
+    set: tuple[str, ...] = ()  # Options of the task, as n_robots=3 goal=(2,1).
     variables: tuple[str, ...] = ()
     """Variables to test; by default all but the copies of an agent's own."""
     pooled: bool = False
     """Compare moves of different agents too, as if their vetoes shared one table."""
     logs: int = 1
     """Logs, each with a seed of its own; with several the matrix shows how many agree."""
-    fresh: int = 100_000
-    """Moves of the log that the first log's result is checked against."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the moves."""
+    fresh: int = 100_000  # Moves of the log that the first log's result is checked against.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the moves.
 
 
 def run(args: Args) -> int:
     """Runs the algorithm; 1 if a fresh log contradicts what it found."""
+    import numpy as np
+    from hose_learning import relevance
+    from hose_learning.experience import record_experience
+
     check_counts(args, moves=1, logs=1, fresh=1, seed=0)
     begun = time.perf_counter()
     task = make_task(args.task, **parse_options(args.set))
-    signals = list_signals(task)
+    signals = relevance.list_signals(task)
     *generators, last = np.random.default_rng(args.seed).spawn(args.logs + 1)
     logs = [record_experience(task, args.moves, generator) for generator in generators]
-    variables = args.variables or list_candidates(task, logs[0])
-    found = [find_relevance(log, signals, variables, args.pooled) for log in logs]
+    variables = args.variables or relevance.list_candidates(task, logs[0])
+    found = [relevance.find_relevance(log, signals, variables, args.pooled) for log in logs]
     fresh = record_experience(task, args.fresh, last)
-    checks = [
-        Check(
-            f"{signal.name}: moves of a fresh log that are not told",
-            count_unexplained(found[0], signal, fresh, args.pooled),
-            0,
-            "==",
-        )
-        for signal in signals
-    ]
+    untold = {s.name: relevance.count_unexplained(found[0], s, fresh, args.pooled) for s in signals}
+    what = "moves of a fresh log that are not told"
+    checks = [Check(f"{name}: {what}", number, 0, "==") for name, number in untold.items()]
     title = f"{args.task}, {args.moves:,} random moves"
     show = partial(_print, found, title)
     return finish("relevance", args, checks, _list(found), show, begun=begun)
@@ -83,6 +68,8 @@ def run(args: Args) -> int:
 
 def _list(found: list[Relevance]) -> dict[str, Any]:
     """The signals, what matters for them in the first log, and in which share of all logs."""
+    import numpy as np
+
     first = found[0]
     share = np.mean([each.relevant for each in found], axis=0)
     return {
@@ -127,6 +114,7 @@ def _print(found: list[Relevance], title: str) -> None:
 
 def _print_matrix(found: list[Relevance], title: str) -> None:
     """Prints variables by signals: a checkmark, or in how many logs one matters."""
+    import numpy as np
     from rich.console import Console
     from rich.table import Table
 

@@ -7,16 +7,18 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
-from hose_learning.study.experiments import EXPERIMENTS, Experiment, Finding
-from hose_learning.study.jobs import do_all
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
-from hose_mj.cli.results import check_choice, check_counts
+from hose_mj.cli.results import check_counts
+from hose_mj.errors import check_choice
 from hose_mj.recording.document import make_document, print_document
+
+if TYPE_CHECKING:
+    from hose_learning.study.experiments import Experiment, Finding
 
 
 @dataclass(frozen=True)
@@ -29,22 +31,19 @@ class Args:
 
     items: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """fig-4.2, fig-5.3, table-6.3, fig-6.4; all of them by default."""
-    seeds: int = 10
-    """How many seeds, counted from --seed."""
-    quick: bool = False
-    """Two seeds."""
-    workers: int | None = None
-    """Processes; as many as there are cores by default."""
-    out: Path = Path("out/reproduce")
-    """Where the runs are kept."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """The first seed."""
+    seeds: int = 10  # How many seeds, counted from --seed.
+    quick: bool = False  # Two seeds.
+    workers: int | None = None  # Processes; as many as there are cores by default.
+    out: Path = Path("out/reproduce")  # Where the runs are kept.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # The first seed.
 
 
 def run(args: Args) -> int:
     """Runs the experiments; 1 if a check failed."""
+    from hose_learning.study.experiments import EXPERIMENTS
+    from hose_learning.study.jobs import do_all
+
     for item in args.items:
         check_choice("item", item, EXPERIMENTS)
     check_counts(args, seeds=1, seed=0, workers=1)

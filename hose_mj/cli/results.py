@@ -22,12 +22,6 @@ def check_counts(args: Any, **least: int) -> None:
             raise InputError(name, value, f"a whole number, at least {bound}")
 
 
-def check_choice(thing: str, value: object, known: Iterable[str]) -> None:
-    """Raises `InputError` for a value that is not among the known ones."""
-    if value not in (names := list(known)):
-        raise InputError(thing, value, f"one of {', '.join(names)}")
-
-
 def make_folder(out: Path) -> None:
     """Makes the folder `out` unless it is there.
 

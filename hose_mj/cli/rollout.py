@@ -6,31 +6,23 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
-from hose_learning import loop
-from hose_learning.evaluation import make_probe
-from hose_learning.study.run_folder import RunFolder
 
-from hose_mj.cli.results import check_choice, check_counts
-from hose_mj.constraints.monitor import Monitor
-from hose_mj.errors import InputError
+from hose_mj.cli.results import check_counts
+from hose_mj.errors import InputError, check_choice
 from hose_mj.extras import require
 from hose_mj.recording.document import make_document, print_document
-from hose_mj.recording.sinks import Sink
-from hose_mj.rollout.capture import Capture
-from hose_mj.rollout.episode import EpisodeResult, Observer, run_episode
-from hose_mj.rollout.policies import POLICIES, make_policy
-from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
-from hose_mj.tasks.kernels import STEPS, TURN
-from hose_mj.tasks.line.kernels import Line
-from hose_mj.tasks.stream import make_stream
-from hose_mj.world.actions import Actions, compute_cells
-from hose_mj.world.driving import Driver
 from hose_mj.world.registry import WORLDS, make_world
-from hose_mj.world.world import World
+
+if TYPE_CHECKING:
+    from hose_mj.constraints.monitor import Monitor
+    from hose_mj.recording.sinks import Sink
+    from hose_mj.rollout.capture import Capture
+    from hose_mj.rollout.episode import EpisodeResult, Observer, Policy
+    from hose_mj.scenes.mjcf.scene import Scene
+    from hose_mj.world.world import World
 
 ENDINGS = {"save": ".rrd", "mp4": ".mp4", "csv": ".csv"}
 EXTRAS_OF_ENDINGS = {"save": "viewer", "mp4": "video", "csv": "pyarrow"}
@@ -46,46 +38,31 @@ class Args:
 
     scene: Annotated[str, tyro.conf.Positional]
     """A shipped scene (floor_1 to floor_6, corridor, deck, lift), or your own MJCF file."""
-    model: str = "geds"
-    """The hose's model: geds, cable or flex."""
+    model: str = "geds"  # The hose's model: geds, cable or flex.
     models: tuple[str, ...] = ()
     """Two models instead of one: both episodes run and are shown overlaid."""
     policy: str = "to-goal"
     """random, to-goal, break-stretch, break-run-over, break-collision, break-obstacle,
     break-bounds, or the run folder of a learner (hose-mj train line)."""
-    duration: float = 5.0
-    """Simulated time after which the episode ends (s)."""
-    save: Path | None = None
-    """Write a Rerun recording, F.rrd; open it with hose-mj view."""
-    spawn: bool = False
-    """Open Rerun's viewer and show the episode while it runs."""
+    duration: float = 5.0  # Simulated time after which the episode ends (s).
+    save: Path | None = None  # Write a Rerun recording, F.rrd; open it with hose-mj view.
+    spawn: bool = False  # Open Rerun's viewer and show the episode while it runs.
     connect: str | None = None
     """Show it in a viewer that listens at this URL, as rerun+http://127.0.0.1:9876/proxy."""
-    mp4: Path | None = None
-    """Write a film."""
-    csv: Path | None = None
-    """Write a table: a row for each sample."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of everything that is left to chance."""
+    mp4: Path | None = None  # Write a film.
+    csv: Path | None = None  # Write a table: a row for each sample.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of everything that is left to chance.
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """One episode as the document and the terminal show it.
+    """One episode as the document and the terminal show it."""
 
-    Attributes:
-        world: in which it was.
-        outcome: how it ended.
-        wall_s: of planning and the episode (s).
-        overhead: time that recording took over that of the rest, see `_Timed`.
-    """
-
-    world: World
-    outcome: EpisodeResult
-    wall_s: float
-    overhead: float
+    world: World  # in which it was
+    outcome: EpisodeResult  # how it ended
+    wall_s: float  # of planning and the episode (s)
+    overhead: float  # time that recording took over that of the rest, see `_Timed`
 
     def to_record(self, args: Args) -> dict[str, Any]:
         """The document's fields."""
@@ -191,6 +168,8 @@ class Recording:
 
     def make_observers(self) -> list[Observer]:
         """What is to watch the next episode; nothing where nothing is recorded."""
+        from hose_mj.rollout.capture import Capture
+
         wishes = self._wishes
         sinks: list[Sink] = []
         if not self._overlays and (wishes.save or wishes.connect or wishes.spawn):
@@ -226,6 +205,8 @@ class Recording:
 
 def run(args: Args) -> int:
     """Runs the episodes; 0 when done."""
+    from hose_mj.scenes.mjcf.scene import find_scene, read_scene
+
     models = _check(args)
     scene = read_scene(find_scene(args.scene))
     with Recording(args, scene, len(models)) as recording:
@@ -242,7 +223,9 @@ def run(args: Args) -> int:
 
 def _check(args: Args) -> tuple[str, ...]:
     """Returns the models to run; raises `InputError` for a value outside its valid set."""
-    if args.models and (len(args.models) != 2 or len(set(args.models) & set(WORLDS)) != 2):
+    for model in args.models:
+        check_choice("models", model, WORLDS)
+    if args.models and (len(args.models) != 2 or len(set(args.models)) != 2):
         valid = f"two different ones of {', '.join(WORLDS)}"
         raise InputError("models", " ".join(args.models), valid)
     check_choice("model", args.model, WORLDS)
@@ -252,14 +235,26 @@ def _check(args: Args) -> tuple[str, ...]:
     return args.models or (args.model,)
 
 
+def _choose_policy(name: str) -> Policy:
+    """Makes a policy by its name; raises `InputError` for what is neither one nor a folder."""
+    from hose_mj.rollout.policies import POLICIES, make_policy
+
+    if name in POLICIES:
+        return make_policy(name)
+    if Path(name).is_dir():
+        from hose_mj.cli.saved_learner import SavedLearner
+
+        return SavedLearner(Path(name))
+    raise InputError("policy", name, f"{', '.join(POLICIES)}, or the run folder of a learner")
+
+
 def _roll_out(args: Args, scene: Scene, model: str, recording: Recording) -> Rollout:
-    if args.policy in POLICIES:
-        policy = make_policy(args.policy)
-    elif Path(args.policy).is_dir():
-        policy = SavedLearner(Path(args.policy))
-    else:
-        valid = f"{', '.join(POLICIES)}, or the run folder of a learner"
-        raise InputError("policy", args.policy, valid)
+    import numpy as np
+
+    from hose_mj.constraints.monitor import Monitor
+    from hose_mj.rollout.episode import run_episode
+
+    policy = _choose_policy(args.policy)
     world = make_world(scene, model)
     monitor = Monitor(world)
     timed = _Timed(recording.make_observers())
@@ -273,89 +268,3 @@ def _roll_out(args: Args, scene: Scene, model: str, recording: Recording) -> Rol
         settings=settings,
     )
     return Rollout(world, outcome, time.perf_counter() - begun, timed.overhead)
-
-
-class SavedLearner:
-    """What a training learned, acting greedily, one robot after the other.
-
-    Before each turn the robots' and the goal's cells become the task's state; the learner's choice
-    is then driven in the world. Steps of the world between two turns are the task's one move.
-
-    Args:
-        path: the run folder of a training on the task `line`.
-
-    Raises:
-        InputError: no run, or one of another task or of a learner whose agents move at once.
-    """
-
-    ends_at_goal = True
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._training, _ = RunFolder(path).open()
-        task = self._training.task
-        if not isinstance(task.kernel, Line) or task.kernel.own_goals:
-            raise InputError("task of the run", task.id, "line, with one goal")
-        if self._training.entry.schedule == "joint":
-            valid = "one whose agents move in turns"
-            raise InputError("learner of the run", self._training.learner_id, valid)
-
-    def start(self, world: World, monitor: Monitor, generator: np.random.Generator) -> None:
-        """Begins with the tip's robot.
-
-        Raises:
-            InputError: a scene with another number of robots, hose or goal than the task's.
-        """
-        self._world = world
-        self._check_fit(world)
-        self._memory = make_probe(self._training.memory)
-        self._memory.stream[:] = make_stream(generator)
-        self._actions = Actions(Driver(world))
-        self._moves = 0
-        self._vetoed: tuple[str, ...] = ()
-
-    def update(self) -> None:
-        """Lets the next robot begin where the last has done, then drives all."""
-        if self._actions.is_done():
-            self._actions.begin(*self._choose())
-        self._actions.update()
-
-    def describe(self) -> Mapping[str, Any]:
-        """The turn's owner, its move, and what was vetoed to it."""
-        return {**self._actions.describe(), "vetoed": self._vetoed}
-
-    def _check_fit(self, world: World) -> None:
-        settings = self._training.task.settings
-        length = world.scene.spec.length / world.scene.cell_size
-        facts: dict[str, tuple[Any, Any]] = {
-            "robots": (world.n_robots, settings.n_robots),
-            "cells along the hose": (round(length, 6), settings.hose_length),
-        }
-        if isinstance(settings.goal, tuple):
-            goal = compute_cells(world, world.goal_position())
-            facts["goal's cell"] = ((int(goal[0]), int(goal[1])), settings.goal)
-        for name, (found, learned) in facts.items():
-            if found != learned:
-                raise InputError(f"{name} of the scene", found, f"{learned}, as in {self._path}")
-
-    def _choose(self) -> tuple[int, str]:
-        """The robot whose turn it is, and its action."""
-        task, learner, memory = self._training.task, self._training.learner, self._memory
-        h = task.settings.half_width
-        cells = compute_cells(self._world, self._world.site_positions()[:-1])[:, :2]
-        goal = compute_cells(self._world, self._world.goal_position())[:2]
-        memory.state[task.layout["robots"]] = np.clip(cells, -h, h).ravel()
-        memory.state[task.layout["source"]] = 0
-        memory.state[task.layout["goals"]] = np.clip(goal, -h, h)
-        agent = self._moves % task.n_agents
-        memory.state[TURN], memory.state[STEPS] = agent, self._moves
-        self._moves += 1
-        with np.errstate(over="ignore"):  # the stream's arithmetic is modulo 2^64
-            allowed = loop.see(task.kernel, learner, memory, agent)
-            action = loop.choose(task.kernel, learner, memory, agent, allowed, False)
-        names = task.action_names
-        self._vetoed = tuple(name for k, name in enumerate(names) if not int(allowed) >> k & 1)
-        if task.schedule != "single":
-            return agent, names[action]
-        name, _, robot = names[action].rpartition("_")
-        return int(robot), name

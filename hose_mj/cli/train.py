@@ -9,25 +9,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
-from hose_learning.learners import catalog
-from hose_learning.presets import VALUES, VETOES
-from hose_learning.settings import Exploration
-from hose_learning.study.statistics import compute_rate_interval
-from hose_learning.study.training import Episodes, Training, join
 
 from hose_mj.cli.progress import defer_interrupt, show_progress
-from hose_mj.cli.results import check_choice, check_counts, print_table
+from hose_mj.cli.results import check_counts, print_table
 from hose_mj.cli.task_options import parse_options
+from hose_mj.errors import check_choice
 from hose_mj.extras import require
-from hose_mj.jit import compile_notice
 from hose_mj.recording.document import make_document, print_document
 from hose_mj.tasks.registry import list_tasks, make_task
-from hose_mj.tasks.task import Task
 
 if TYPE_CHECKING:
+    from hose_learning.settings import Exploration
     from hose_learning.study.run_folder import RunFolder
+    from hose_learning.study.training import Episodes, Training
+
+    from hose_mj.tasks.task import Task
 
 DEFAULT_EPISODES = {"line": 100_000, "line-non-cooperative": 100_000, "line-2015": 20_000}
 """Where the default of 2,000 episodes is too few."""
@@ -38,18 +35,13 @@ SAVE_SECONDS = 60.0
 class LearnerArgs:
     """What every command that trains lets a user set about task and learner."""
 
-    set: tuple[str, ...] = ()
-    """Options of the task, as n_robots=3 goal=(2,1)."""
-    epsilon: float | None = None
-    """Share of random choices at the start."""
+    set: tuple[str, ...] = ()  # Options of the task, as n_robots=3 goal=(2,1).
+    epsilon: float | None = None  # Share of random choices at the start.
     epsilon_per_episode: float | None = None
     """What epsilon falls by after each episode; by default it reaches 0 after half of them."""
-    epsilon_per_success: float | None = None
-    """What epsilon falls by after each success."""
-    learning_rate: float | None = None
-    """Alpha."""
-    discount: float | None = None
-    """Gamma."""
+    epsilon_per_success: float | None = None  # What epsilon falls by after each success.
+    learning_rate: float | None = None  # Alpha.
+    discount: float | None = None  # Gamma.
     values: str | None = None
     """What the value modules see: goal, local or monolithic; the default depends on the learner."""
     vetoes: str | None = None
@@ -68,29 +60,27 @@ class Args(LearnerArgs):
     """A task: line, taxi, corridor, maze, ... (--list names all)."""
     learner: str | None = None
     """A learner; by default thresholded-msav on the line tasks and d-rr-ql on the others."""
-    list: bool = False
-    """List tasks and learners and stop."""
-    options: tuple[str, ...] = ()
-    """Options of the learner's own, as trace_decay=0.8."""
+    list: bool = False  # List tasks and learners and stop.
+    options: tuple[str, ...] = ()  # Options of the learner's own, as trace_decay=0.8.
     episodes: int | None = None
     """Episodes to train for, counted from the start of the run; the default depends on the task, or
     with --resume on what the run was to end after."""
     moves: int | None = None
     """Moves of single agents after which training ends, if that comes first."""
-    tests: int = 200
-    """Greedy episodes after training."""
-    out: Path | None = None
-    """Run folder; by default a new one, out/train/TASK-LEARNER-seedN."""
+    tests: int = 200  # Greedy episodes after training.
+    out: Path | None = None  # Run folder; by default a new one, out/train/TASK-LEARNER-seedN.
     resume: Path | None = None
     """Run folder to go on with; its settings replace all that describe a run."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of everything that is left to chance."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of everything that is left to chance.
 
 
 def run(args: Args) -> int:
     """Trains; 0 when done."""
+    from hose_learning.presets import VALUES, VETOES
+
+    from hose_mj.jit import compile_notice
+
     if args.list:
         _list(args)
         return 0
@@ -126,6 +116,10 @@ def make_training(args: Args) -> Training:
     Raises:
         InputError: an unknown task or learner, or a setting that it does not allow.
     """
+    import numpy as np
+    from hose_learning.learners import catalog
+    from hose_learning.study.training import Training
+
     task = make_task(args.task, **parse_options(args.set))
     id = args.learner or ("thresholded-msav" if args.task.startswith("line") else "d-rr-ql")
     catalog.find_learner(id)
@@ -175,6 +169,8 @@ def _given(args: Args) -> dict[str, Any]:
 
 def _explore(args: Args, task: Task) -> Exploration:
     """Epsilon as asked for; else .3 throughout on random line tasks (4.6.1.2), and falling."""
+    from hose_learning.settings import Exploration
+
     is_random = task.id.startswith("line") and task.settings.goal == "random"
     if is_random and args.epsilon_per_episode is None and args.epsilon_per_success is None:
         return Exploration(epsilon=0.3 if args.epsilon is None else args.epsilon)
@@ -193,14 +189,18 @@ def _count_episodes(args: Args, task: Task) -> int:
 
 def _compile(training: Training) -> None:
     """Runs the loop and the test once on a training of its own, so that compiling is not timed."""
+    import numpy as np
+
     parts = (training.task, training.learner_id, training.settings)
-    trial = Training(*parts, np.random.default_rng(0))
+    trial = type(training)(*parts, np.random.default_rng(0))
     trial.advance(moves=1)
     trial.test(1, max_moves=1)
 
 
 def _train(training: Training, folder: RunFolder, args: Args) -> Episodes:
     """Trains to the end, with a progress bar and checkpoints; returns what ended meanwhile."""
+    from hose_learning.study.training import join
+
     episodes = max(0, _count_episodes(args, training.task) - training.episodes)
     moves = None if args.moves is None else max(0, args.moves - training.moves)
     parts: list[Episodes] = []
@@ -226,6 +226,8 @@ def _train(training: Training, folder: RunFolder, args: Args) -> Episodes:
 def _summarize(
     training: Training, folder: RunFolder, ended: Episodes, tests: Episodes
 ) -> dict[str, Any]:
+    from hose_learning.study.statistics import compute_rate_interval
+
     task = training.task
     last = ended.find_successes(task)[-max(1, len(ended) // 10) :]
     success = tests.find_successes(task)
@@ -247,6 +249,8 @@ def _summarize(
 
 
 def _list(args: Args) -> None:
+    from hose_learning.learners import catalog
+
     style: dict[str, Any] = {"box": None, "title_justify": "left", "show_header": False}
     tasks = [(id, "", entry.description) for id, entry in list_tasks().items()]
     learners = [(id, e.section, e.description) for id, e in catalog.list_learners().items()]

@@ -5,19 +5,18 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import tyro
-from hose_learning.study.statistics import compute_rate_interval
-from hose_learning.transfer import TransferOutcome, TransferPlan, run_trial
 
 from hose_mj.checks import Check
 from hose_mj.cli.progress import show_progress
 from hose_mj.cli.results import check_counts, finish, print_table
 from hose_mj.cli.task_options import read_options
 from hose_mj.errors import InputError
-from hose_mj.jit import compile_notice
+
+if TYPE_CHECKING:
+    from hose_learning.transfer import TransferOutcome
 
 
 @dataclass(frozen=True)
@@ -29,26 +28,19 @@ class Args:
     explores the target from scratch for the same cost.
     """
 
-    source: Annotated[str, tyro.conf.Positional]
-    """Id of the task to learn on first."""
-    target: Annotated[str, tyro.conf.Positional]
-    """Id of the task that it is for."""
+    source: Annotated[str, tyro.conf.Positional]  # Id of the task to learn on first.
+    target: Annotated[str, tyro.conf.Positional]  # Id of the task that it is for.
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Options of both tasks, or of one: source.NAME=VALUE, target.NAME=VALUE."""
-    moves: int = 300_000
-    """Moves of single agents on the source."""
-    episodes: int = 3
-    """Greedy learning episodes on the target."""
-    configurations: int = 30
-    """How often all this is done."""
+    moves: int = 300_000  # Moves of single agents on the source.
+    episodes: int = 3  # Greedy learning episodes on the target.
+    configurations: int = 30  # How often all this is done.
     values: str = "goal"
     """What the goal modules see: goal (on a line, all robots' formation), local or monolithic."""
     exchange: tuple[float, ...] = (390_000.0, 1.0)
     """What a move on the target costs, in moves on the source; the thesis's, and equal cost."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of all that is left to chance."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of all that is left to chance.
 
 
 def run(args: Args) -> int:
@@ -71,6 +63,11 @@ def run(args: Args) -> int:
 
 def _run_all(args: Args) -> list[TransferOutcome]:
     """Runs one configuration after the other, each with a generator of its own."""
+    import numpy as np
+    from hose_learning.transfer import TransferPlan, run_trial
+
+    from hose_mj.jit import compile_notice
+
     options = read_options(args.set, ("source", "target"))
     plan = TransferPlan(
         source=args.source,
@@ -98,6 +95,7 @@ def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> l
     One row for each greedy episode (the goal was reached in it for the first time), one for any of
     them, one for the greedy policy on the source, one for each control.
     """
+    from hose_learning.study.statistics import compute_rate_interval
 
     def first(outcome: TransferOutcome) -> int | None:
         return outcome.reached.index(True) if any(outcome.reached) else None
@@ -112,15 +110,11 @@ def summarize(outcomes: list[TransferOutcome], exchange: tuple[float, ...]) -> l
     for k, rate in enumerate(exchange):
         name = f"exploring, at rate {rate:,.6g}"
         found.append((name, [o.controls[k][1] for o in outcomes]))
-    return [
-        {
-            "what": name,
-            "reached": sum(which),
-            "of": len(which),
-            "interval": compute_rate_interval(sum(which), len(which)),
-        }
-        for name, which in found
-    ]
+    rows = []
+    for name, which in found:
+        interval = compute_rate_interval(sum(which), len(which))
+        rows.append({"what": name, "reached": sum(which), "of": len(which), "interval": interval})
+    return rows
 
 
 def _print(args: Args, outcomes: list[TransferOutcome], rows: list[dict[str, Any]]) -> None:

@@ -22,8 +22,7 @@ class Args:
     """Write a picture (PNG) instead of opening a window; needs no display."""
     at: float | None = None
     """Simulated time to show (s); by default that of the break, else the last sample."""
-    json: bool = False
-    """Print one JSON document about the recording."""
+    json: bool = False  # Print one JSON document about the recording.
 
 
 def run(args: Args) -> int:
@@ -46,13 +45,9 @@ def run(args: Args) -> int:
     else:
         open_recording(recording, at_s)
     if args.json:
+        facts = ("ended_by", "break_kind", "break_time")
         episodes = [
-            {
-                "model": name,
-                "ended_by": outcome["ended_by"],
-                "break_kind": outcome.get("break_kind"),
-                "break_time": outcome.get("break_time"),
-            }
+            {"model": name, **{fact: outcome.get(fact) for fact in facts}}
             for name, outcome in outcomes.items()
         ]
         results = {"recording": recording, "at": at_s, "episodes": episodes}

@@ -11,8 +11,7 @@ from typing import Annotated, Any
 import tyro
 
 from hose_mj.cli.progress import show_progress
-from hose_mj.cli.results import check_choice
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.recording.document import make_document, print_document
 
 SCHEMES = ("bdf2", "backward-euler", "sdirk2", "midpoint")
@@ -33,8 +32,7 @@ class Args:
 
     groups: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="GROUP")] = ()
     """hose, world, learn; all of them by default."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
 
 
 def run(args: Args) -> int:
@@ -163,8 +161,4 @@ def _use_learner(task_id: str, learner: str) -> None:
     training.test(1, max_moves=1)
 
 
-GROUPS: dict[str, Callable[[], dict[str, Job]]] = {
-    "hose": list_hose_jobs,
-    "world": list_world_jobs,
-    "learn": list_learn_jobs,
-}
+GROUPS = {"hose": list_hose_jobs, "world": list_world_jobs, "learn": list_learn_jobs}

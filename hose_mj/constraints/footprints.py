@@ -6,8 +6,6 @@ the centre line. The chords miss it by their sagitta, a quarter of a piece's len
 its curvature over 8.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -25,28 +23,20 @@ from hose_mj.world.world import World
 
 TOUCH, TOUCH_RADII = 2e-3, 0.05
 """A robot stands on what is nearer than this (m), or than this part of its radius."""
-STEEPEST = 0.7
-"""Cosine of the steepest ground that a robot stands on: 45 degrees."""
+STEEPEST = 0.7  # cosine of the steepest ground that a robot stands on: 45 degrees
 _ROUNDING = 1e-9
 _ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
 _CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
-CHORDS = 4
-"""Capsules in a piece of the centre line."""
+CHORDS = 4  # capsules in a piece of the centre line
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """What of a robot must not meet hose, robots and obstacles.
+    """What of a robot must not meet hose, robots and obstacles."""
 
-    Attributes:
-        geoms: numbers of its colliding geoms; all of its geoms where none collides.
-        radius: of an upright cylinder around them, about the middle of their bounding box (m).
-        upright: whether it is a single cylinder whose axis is and stays vertical: a puck.
-    """
-
-    geoms: NDArray[np.int64]
-    radius: float
-    upright: bool
+    geoms: NDArray[np.int64]  # numbers of its colliding geoms; all of its geoms where none collides
+    radius: float  # of an upright cylinder around them, about the middle of their bounding box (m)
+    upright: bool  # whether it is a single cylinder whose axis is and stays vertical: a puck
 
 
 def make_footprint(world: World, robot: int) -> Footprint:

@@ -7,8 +7,6 @@ two of them it is left out again when even the straight way between them could n
 Newton's method on f', falling back to halving where f' jumps.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hose_mj.hoses.geds.shapes import measure
@@ -19,15 +17,12 @@ Point = tuple[float, float, float]
 Line = tuple[Array, Array, Array]
 """Arc lengths (K + 1,), m, coefficients (K, 4, 3), m, and balls (K, 5) of a line's pieces."""
 
-_PARTS = 4
-"""Parts of a piece between which f is looked at."""
-_TURNS = 60
-"""Steps of Newton's method at most: halving alone would need 34 to `_FINE`."""
+_PARTS = 4  # parts of a piece between which f is looked at
+_TURNS = 60  # steps of Newton's method at most: halving alone would need 34 to `_FINE`
 _FINE = 1e-10
 """Width in u at which a minimum is found; a kink of f is then missed by no more than this times the
 piece's length."""
-BALL = 5
-"""Columns of a piece's ball: centre (3), radius, largest |dr/du|."""
+BALL = 5  # columns of a piece's ball: centre (3), radius, largest |dr/du|
 
 
 @kernel

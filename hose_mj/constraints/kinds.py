@@ -4,8 +4,6 @@ A new kind is a row of `KINDS` here, with a number for it, and a kernel that wri
 margin_kernels.py. Monitors, breaks, recordings and policies read the rest from the row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
 from typing import NamedTuple
@@ -32,32 +30,22 @@ def _list_robots(watched: Watched) -> list[Members]:
 
 
 class Kind(NamedTuple):
-    """One kind of constraint.
+    """One kind of constraint."""
 
-    Attributes:
-        name: as in the names of margins, breaks and policies.
-        unit: of its margins, "N" or "m".
-        color: red, green and blue of its margins in recordings, 0 to 255.
-        sentence: what happened when it breaks, with {robot} and {other}.
-        limit: what its margins are measured against, with {limit}: the clearance, or for stretch
-            the largest tension.
-        clearance: how near (m) things may come, from the limits and the hose's radius (m).
-        members: lists robot and other of each margin; its length is how many there are.
-        needs: what a scene needs for this kind to be broken.
-        script: name of the function of rollout/scripts.py that lists ways to break it.
-        other: what the other party of a break is: "segment", "robot", "geom"; "" for none.
-    """
-
-    name: str
-    unit: str
-    color: tuple[int, int, int]
-    sentence: str
+    name: str  # as in the names of margins, breaks and policies
+    unit: str  # of its margins, "N" or "m"
+    color: tuple[int, int, int]  # red, green and blue of its margins in recordings, 0 to 255
+    sentence: str  # what happened when it breaks, with {robot} and {other}
+    # What its margins are measured against, with {limit}: the clearance, or for stretch the largest
+    # tension.
     limit: str
+    # How near (m) things may come, from the limits and the hose's radius (m).
     clearance: Callable[[Limits, float], float]
+    # Lists robot and other of each margin; its length is how many there are.
     members: Callable[[Watched], list[Members]]
-    needs: str
-    script: str
-    other: str
+    needs: str  # what a scene needs for this kind to be broken
+    script: str  # name of the function of rollout/scripts.py that lists ways to break it
+    other: str  # what the other party of a break is: "segment", "robot", "geom"; "" for none
 
 
 KINDS = (
@@ -122,5 +110,4 @@ KINDS = (
         other="geom",
     ),
 )
-KIND_OF = {kind.name: kind for kind in KINDS}
-"""Kinds by name."""
+KIND_OF = {kind.name: kind for kind in KINDS}  # kinds by name

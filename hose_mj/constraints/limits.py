@@ -1,7 +1,5 @@
 """`Limits`: the numbers that a world's margins are measured against."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from hose_mj.errors import InputError
@@ -9,12 +7,10 @@ from hose_mj.hoses.spec import HoseSpec, check_number
 
 WEIGHTS = 2.0
 """A hose may always be pulled by so many times its own weight (`compute_tension_limit`)."""
-TOUCHING = 0.1
-"""Run-over distance by default, in radii of the hose."""
+TOUCHING = 0.1  # run-over distance by default, in radii of the hose
 OWN_RADII = 3.0
 """Hose to either side of an attachment that is a robot's own by default, in its radii."""
-SIGHT_RADII = 5.0
-"""How far distances are measured by default, in radii of the largest robot."""
+SIGHT_RADII = 5.0  # how far distances are measured by default, in radii of the largest robot
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,6 @@ everywhere the `Tables`: margins of a kind begin at `t.starts[KIND]` and end at
 `t.starts[KIND + 1]`, and things may come as near as `t.clearances[KIND]`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -34,63 +32,34 @@ _GAUSS = ((0.5 - np.sqrt(0.15), 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + np.sqrt(0
 
 
 class Tables(NamedTuple):
-    """What does not change while a monitor watches, and room to work in.
+    """What does not change while a monitor watches, and room to work in."""
 
-    Attributes:
-        radius: of the hose, m.
-        tension: that breaks a segment, N.
-        stiffness: the hose's axial stiffness, N.
-        lengthening: that breaks a segment, as a fraction.
-        sight: distances are measured up to this, m.
-        clearances: of each kind, in the order of `KINDS` (n_kinds,), m.
-        bounds: low and high corner (2, 3), m.
-        starts: the first margin of each kind, in this order, and the end (n_kinds + 1,).
-        segments: arc lengths of the attachments from the source's, (N + 1,), m.
-        own: arc lengths between which a robot's own hose lies (N, 2), m.
-        samples: arc lengths where tension is known (T,), m.
-        sample_segments: the segment of each (T,).
-        parts: parts of the hose within one piece and one segment: piece, segment (P, 2).
-        part_ends: where they begin and end within the piece (P, 2).
-        rows: geoms of robots and obstacles, as in hoses/geds/shapes.py (G, ROW).
-        ids: their numbers in the mjModel (G,).
-        robot_rows: robot i has the rows from its entry to the next one's (N + 1,).
-        upright: whether a robot is one cylinder that stays upright (N,).
-        obstacles: whether a robot's geom may hit a geom (R, G).
-        balls: of the hose's pieces (K, 5).
-        hulls: centre and radius of a ball about each robot (N, 4), m.
-        near: pairs of geoms left to MuJoCo: rows and margin (Q, 3).
-        gaps: lower bounds on the distances of these pairs (Q,), m.
-        margins: (M,).
-        places: (M, 3), m.
-        others: segment or row that a margin is about, -1 for none (M,).
-    """
-
-    radius: float
-    tension: float
-    stiffness: float
-    lengthening: float
-    sight: float
-    clearances: Array
-    bounds: Array
-    starts: Ints
-    segments: Array
-    own: Array
-    samples: Array
-    sample_segments: Ints
-    parts: Ints
-    part_ends: Array
-    rows: Array
-    ids: Ints
-    robot_rows: Ints
-    upright: NDArray[np.bool_]
-    obstacles: NDArray[np.bool_]
-    balls: Array
-    hulls: Array
-    near: Ints
-    gaps: Array
-    margins: Array
-    places: Array
-    others: Ints
+    radius: float  # of the hose, m
+    tension: float  # that breaks a segment, N
+    stiffness: float  # the hose's axial stiffness, N
+    lengthening: float  # that breaks a segment, as a fraction
+    sight: float  # distances are measured up to this, m
+    clearances: Array  # of each kind, in the order of `KINDS` (n_kinds,), m
+    bounds: Array  # low and high corner (2, 3), m
+    starts: Ints  # the first margin of each kind, in this order, and the end (n_kinds + 1,)
+    segments: Array  # arc lengths of the attachments from the source's, (N + 1,), m
+    own: Array  # arc lengths between which a robot's own hose lies (N, 2), m
+    samples: Array  # arc lengths where tension is known (T,), m
+    sample_segments: Ints  # the segment of each (T,)
+    parts: Ints  # parts of the hose within one piece and one segment: piece, segment (P, 2)
+    part_ends: Array  # where they begin and end within the piece (P, 2)
+    rows: Array  # geoms of robots and obstacles, as in hoses/geds/shapes.py (G, ROW)
+    ids: Ints  # their numbers in the mjModel (G,)
+    robot_rows: Ints  # robot i has the rows from its entry to the next one's (N + 1,)
+    upright: NDArray[np.bool_]  # whether a robot is one cylinder that stays upright (N,)
+    obstacles: NDArray[np.bool_]  # whether a robot's geom may hit a geom (R, G)
+    balls: Array  # of the hose's pieces (K, 5)
+    hulls: Array  # centre and radius of a ball about each robot (N, 4), m
+    near: Ints  # pairs of geoms left to MuJoCo: rows and margin (Q, 3)
+    gaps: Array  # lower bounds on the distances of these pairs (Q,), m
+    margins: Array  # (M,)
+    places: Array  # (M, 3), m
+    others: Ints  # segment or row that a margin is about, -1 for none (M,)
 
 
 @kernel

@@ -1,7 +1,5 @@
 """`Monitor`: the signed margins of a world, and the breaks as they happen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
@@ -16,6 +14,7 @@ from hose_mj.constraints.hose_distance import BALL
 from hose_mj.constraints.kinds import KIND_OF, KINDS, OBSTACLE, RUN_OVER, Kind, Watched
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.margin_kernels import OTHER_KIND, Ints, Tables, measure_margins
+from hose_mj.errors import InputError
 from hose_mj.hoses.geds import shapes
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compile_notice
@@ -29,26 +28,18 @@ _INSIDE = 1e-9
 
 @dataclass(frozen=True)
 class Break:
-    """A margin that fell below zero.
+    """A margin that fell below zero."""
 
-    Attributes:
-        kind: name of one of `KINDS`.
-        robot: the robot's number; None for a stretched segment.
-        other: the segment (stretch, run-over), the other robot (collision), the obstacle's geom
-            (obstacle); None for bounds.
-        time: when the margin was zero (s).
-        place: where (3,), m, world frame.
-        margin: at the end of the step in which it was crossed, m, or N for stretch.
-        speed: how fast the margin fell in that step, m/s, or N/s for stretch; 0 for a margin that
-            was below zero from the start.
-    """
-
-    kind: str
-    robot: int | None
+    kind: str  # name of one of `KINDS`
+    robot: int | None  # the robot's number; None for a stretched segment
+    # The segment (stretch, run-over), the other robot (collision), the obstacle's geom (obstacle);
+    # None for bounds.
     other: int | str | None
-    time: float
-    place: tuple[float, float, float]
-    margin: float
+    time: float  # when the margin was zero (s)
+    place: tuple[float, float, float]  # where (3,), m, world frame
+    margin: float  # at the end of the step in which it was crossed, m, or N for stretch
+    # How fast the margin fell in that step, m/s, or N/s for stretch; 0 for a margin that was below
+    # zero from the start.
     speed: float
 
     def describe(self) -> str:
@@ -90,10 +81,14 @@ class Monitor:
         breaks: all that the last `check` or `reset` found, the earliest first.
 
     Raises:
-        InputError: a robot without geoms, or limits that name a geom that is not there.
+        InputError: no world, a robot without geoms, or limits that name a geom that is not there.
     """
 
     def __init__(self, world: World, limits: Limits | None = None) -> None:
+        if not isinstance(world, World):
+            raise InputError("world", world, "a world, as make_world returns it")
+        if limits is not None and not isinstance(limits, Limits):
+            raise InputError("limits", limits, "a Limits, or None for the defaults")
         self.world, self.limits = world, limits or Limits()
         self._footprints = [make_footprint(world, i) for i in range(world.n_robots)]
         self._obstacles = find_obstacles(world, self._footprints, self.limits.ground)

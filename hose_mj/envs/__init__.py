@@ -27,8 +27,7 @@ def name_environment(task: str) -> str:
     return f"hose_mj/{''.join(word[:1].upper() + word[1:] for word in words)}-v0"
 
 
-IDS = {name_environment(task): task for task in TASKS}
-"""Our tasks' ids by environment id."""
+IDS = {name_environment(task): task for task in TASKS}  # our tasks' ids by environment id
 ALONE = {name_environment(task) for task, entry in TASKS.items() if entry.is_alone}
 """Those of one agent, which PettingZoo does not get."""
 

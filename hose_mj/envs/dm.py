@@ -1,7 +1,5 @@
 """`DmEnv`: a task behind the interface dm_env, made of `TaskEnv`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import dm_env

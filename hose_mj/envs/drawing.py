@@ -4,8 +4,6 @@ The type of a task's record selects the function that makes its `Picture` (`draw
 needs beyond that is loaded at the first frame.
 """
 
-from __future__ import annotations
-
 import functools
 import sys
 from collections.abc import Sequence
@@ -142,12 +140,8 @@ def list_lines(picture: Picture) -> Array:
 # What each task looks like
 
 GOAL_COLOR: Rgb = (34, 139, 87)
-STATION_COLORS: dict[str, Rgb] = {
-    "R": (200, 55, 50),
-    "G": (40, 140, 70),
-    "Y": (190, 150, 0),
-    "B": (50, 95, 190),
-}
+STATION_COLORS: dict[str, Rgb] = {"R": (200, 55, 50), "G": (40, 140, 70)}
+STATION_COLORS |= {"Y": (190, 150, 0), "B": (50, 95, 190)}
 _STEPS: dict[str, Point] = {"up": (0, 1), "down": (0, -1), "left": (-1, 0), "right": (1, 0)}
 
 
@@ -213,25 +207,14 @@ def draw_line(record: Line, task: Task, state: Integers, caption: str) -> Pictur
     corners = [(float(x), float(y)) for x, y in (*points, source)]
     marks = [Mark(SOURCE, corners[-1])]
     if record.goal_mode != ABSENT:
-        marks += [
-            Mark(
-                GOAL,
-                (float(x), float(y)),
-                str(number) if record.own_goals else "",
-                AGENT_COLORS[number % len(AGENT_COLORS)] if record.own_goals else GOAL_COLOR,
-            )
-            for number, (x, y) in enumerate(goals)
-        ]
-    side = 2 * record.half_width + 1
-    return Picture(
-        (-record.half_width, -record.half_width),
-        side,
-        side,
-        (*marks, *number_robots(points)),
-        hose=tuple(corners),
-        flags=list_flags(task, state, corners[:-1]),
-        caption=caption,
-    )
+        for number, (x, y) in enumerate(goals):
+            own = (str(number), AGENT_COLORS[number % len(AGENT_COLORS)])
+            look = own if record.own_goals else ("", GOAL_COLOR)
+            marks.append(Mark(GOAL, (float(x), float(y)), *look))
+    h, side = record.half_width, 2 * record.half_width + 1
+    marks += number_robots(points)
+    flags = list_flags(task, state, corners[:-1])
+    return Picture((-h, -h), side, side, tuple(marks), tuple(corners), (), flags, caption)
 
 
 @draw.register
@@ -257,15 +240,8 @@ def draw_taxi(record: Taxi, task: Task, state: Integers, caption: str) -> Pictur
         for way, wall in zip(("up", "right", "down", "left"), record.walls[cell], strict=True)
         if wall
     ]
-    return Picture(
-        (0, 0),
-        WIDTH,
-        WIDTH,
-        tuple(marks),
-        walls=tuple(walls),
-        flags=list_flags(task, state, taxis),
-        caption=caption,
-    )
+    flags = list_flags(task, state, taxis)
+    return Picture((0, 0), WIDTH, WIDTH, tuple(marks), (), tuple(walls), flags, caption)
 
 
 def _place_taxi_cell(number: int) -> Point:

@@ -1,7 +1,5 @@
 """`Episode`: a task being played, one move or one round at a time; what all interfaces stand on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from typing import Any
@@ -95,9 +93,8 @@ class Episode:
         """
         self._check_running()
         if len(actions) != self.task.n_agents:
-            raise InputError(
-                "actions", actions, f"{self.task.n_agents} actions, one for each agent"
-            )
+            valid = f"{self.task.n_agents} actions, one for each agent"
+            raise InputError("actions", actions, valid)
         numbers = np.array([self.check_action(a, i) for i, a in enumerate(actions)], np.int64)
         self._play(kernels.play_joint if at_once else kernels.play_round, numbers)
 
@@ -149,8 +146,7 @@ def compute_team_signals(reward_by_mover: Floats) -> Floats:
     So an event that all agents feel counts once, as in Table 6.1. `reward_by_mover` is
     (..., movers, agents, n_signals).
     """
-    own: Floats = np.einsum("...mms->...s", reward_by_mover)
-    return own
+    return np.asarray(np.einsum("...mms->...s", reward_by_mover))
 
 
 def sum_signals(signals: Floats, chosen: Integers) -> Floats:

@@ -1,7 +1,5 @@
 """`TaskEnv`: a task as a Gymnasium environment, where one actor chooses for all agents."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

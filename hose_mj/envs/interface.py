@@ -1,7 +1,5 @@
 """The shared part of the interfaces: the task made, the episode played, the agents by name."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -47,9 +45,8 @@ def build_task(task: str | Task, options: dict[str, Any], max_cycles: int | None
 def refuse_reset_options(options: dict[str, Any] | None) -> None:
     """Raises `InputError` for options of a reset: there are none."""
     if options:
-        raise InputError(
-            "options of reset", sorted(options), "none; a task's options are made with it"
-        )
+        valid = "none; a task's options are made with it"
+        raise InputError("options of reset", sorted(options), valid)
 
 
 class Interface:
@@ -80,14 +77,9 @@ class AgentsInterface(Interface):
     """An environment of agents by name, as PettingZoo has them.
 
     Args:
-        task: id of a task, or a task.
-        observe: names of the variables to show; None for all.
-        form: "array" (a Box of integers), "dict" (Dict of Discrete by name) or "index" (one
-            Discrete).
-        rewards: reward signals whose sum is the reward; None for all.
-        render_mode: one of `RENDER_MODES`, or None.
+        task, observe, rewards, render_mode, options: as in `TaskEnv`.
+        form: "array" (a Box of integers), "dict" or "index", as in `TaskEnv`.
         max_cycles: rounds after which an episode is cut off, in place of the task's `step_limit`.
-        options: options of the task.
 
     Raises:
         InputError: an unknown task, option or name, or a value outside its valid set.

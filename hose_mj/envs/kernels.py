@@ -3,8 +3,6 @@
 The first argument of each function is the task's kernel record, as in `hose_mj.tasks.kernels`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -21,46 +19,27 @@ Flags = npt.NDArray[np.int8]
 
 
 class Sight(NamedTuple):
-    """Which variables are seen, and through whose eyes.
+    """Which variables are seen, and through whose eyes."""
 
-    Attributes:
-        agents: the agent that sees each entry, rising (n_seen,).
-        columns: its place among the task's variables (n_seen,).
-    """
-
-    agents: Integers
-    columns: Integers
+    agents: Integers  # the agent that sees each entry, rising (n_seen,)
+    columns: Integers  # its place among the task's variables (n_seen,)
 
 
 class Batch(NamedTuple):
-    """Many copies of a task and what happened to them, all written in place.
+    """Many copies of a task and what happened to them, all written in place."""
 
-    Attributes:
-        states: (n, state_size).
-        streams: random numbers of each copy (n, 1).
-        over: 1 where the episode has ended, so that the next step starts a new one (n,).
-        caused_events: the events that each agent caused (n, n_agents).
-        reward_by_mover: reward of each mover's events, for each agent, by signal
-            (n, n_agents, n_agents, n_signals).
-        values: work arrays of observed values (n, n_variables).
-        seen: the chosen values (n, n_seen).
-        allowed: 1 where an action is available (n, n_agents, n_actions).
-        events: all events of the step (n,).
-        terminated: 1 where an event ended the episode (n,).
-        truncated: 1 where the step limit did (n,).
-    """
-
-    states: Integers
-    streams: Stream
-    over: Flags
-    caused_events: Integers
+    states: Integers  # (n, state_size)
+    streams: Stream  # random numbers of each copy (n, 1)
+    over: Flags  # 1 where the episode has ended, so that the next step starts a new one (n,)
+    caused_events: Integers  # the events that each agent caused (n, n_agents)
+    # Reward of each mover's events, for each agent, by signal (n, n_agents, n_agents, n_signals).
     reward_by_mover: Floats
-    values: Integers
-    seen: Integers
-    allowed: Flags
-    events: Integers
-    terminated: Flags
-    truncated: Flags
+    values: Integers  # work arrays of observed values (n, n_variables)
+    seen: Integers  # the chosen values (n, n_seen)
+    allowed: Flags  # 1 where an action is available (n, n_agents, n_actions)
+    events: Integers  # all events of the step (n,)
+    terminated: Flags  # 1 where an event ended the episode (n,)
+    truncated: Flags  # 1 where the step limit did (n,)
 
 
 @jitable
@@ -134,11 +113,8 @@ def play_one(
     record: Any, batch: Batch, sight: Sight, actions: Integers, at_once: bool, i: int
 ) -> None:
     """Steps copy `i`, or starts its next episode if the last one has ended."""
-    state, caused_events, reward_by_mover = (
-        batch.states[i],
-        batch.caused_events[i],
-        batch.reward_by_mover[i],
-    )
+    state, caused_events = batch.states[i], batch.caused_events[i]
+    reward_by_mover = batch.reward_by_mover[i]
     if batch.over[i]:
         kernels.reset(record, state, batch.streams[i])
         forget(caused_events, reward_by_mover)

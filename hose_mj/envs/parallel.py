@@ -1,7 +1,5 @@
 """`JointEnv`: a task as a PettingZoo Parallel environment: all agents choose, then all move."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +9,8 @@ from hose_mj.envs.episode import check_moves, sum_signals
 from hose_mj.envs.interface import AgentsInterface
 from hose_mj.errors import InputError
 from hose_mj.tasks.task import Task
+
+Named = dict[str, Any]
 
 
 class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
@@ -30,7 +30,7 @@ class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    ) -> tuple[Named, dict[str, Named]]:
         """Starts an episode; `options` are ignored, for there are none."""
         self._start(seed)
         self._renderer.follow(self.episode)
@@ -38,13 +38,7 @@ class JointEnv(AgentsInterface, ParallelEnv[str, Any, Any]):
 
     def step(
         self, actions: Mapping[str, Any]
-    ) -> tuple[
-        dict[str, Any],
-        dict[str, float],
-        dict[str, bool],
-        dict[str, bool],
-        dict[str, dict[str, Any]],
-    ]:
+    ) -> tuple[Named, dict[str, float], dict[str, bool], dict[str, bool], dict[str, Named]]:
         """Lets all agents move.
 
         Raises:

@@ -3,8 +3,6 @@
 Coordinates are cells: x to the right, y upwards, the centre of a cell at whole numbers.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 from math import ceil, dist, floor
@@ -40,27 +38,20 @@ class Mark:
 
 @dataclass(frozen=True)
 class Picture:
-    """A grid and what is on it.
+    """A grid and what is on it."""
 
-    Attributes:
-        corner: cell in the lower left corner.
-        columns, rows: size of the grid in cells.
-        marks: drawn in this order.
-        hose: corners of its centre line, from one end to the other; empty without a hose.
-        walls: segments between cells, each two points (on half-integers).
-        flags: sides of cells that a flag marks as blocked: a point on the side and the cell's
-            centre.
-        caption: a line of text below the grid.
-    """
-
-    corner: tuple[int, int]
+    corner: tuple[int, int]  # cell in the lower left corner
+    # columns, rows: size of the grid in cells.
     columns: int
     rows: int
-    marks: tuple[Mark, ...]
+    marks: tuple[Mark, ...]  # drawn in this order
+    # Corners of its centre line, from one end to the other; empty without a hose.
     hose: tuple[Point, ...] = ()
+    # Segments between cells, each two points (on half-integers).
     walls: tuple[tuple[Point, Point], ...] = ()
+    # Sides of cells that a flag marks as blocked: a point on the side and the cell's centre.
     flags: tuple[tuple[Point, Point], ...] = ()
-    caption: str = ""
+    caption: str = ""  # a line of text below the grid
 
 
 # In characters

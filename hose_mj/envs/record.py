@@ -4,8 +4,6 @@ An environment that shows itself in Rerun in a way of its own has a method `reco
 returns a `Source`; those of tasks on grids are known here.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,8 +15,7 @@ from hose_mj.envs.episode import Episode
 from hose_mj.errors import InputError
 from hose_mj.recording.keep import Keep, Played, RecordingFolder
 
-GOAL = "goal"
-"""Event that counts as success."""
+GOAL = "goal"  # event that counts as success
 
 
 class Source(Protocol):

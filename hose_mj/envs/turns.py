@@ -1,7 +1,5 @@
 """`TurnsEnv`: a task as a PettingZoo AEC environment, the canonical form: agents move in turns."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

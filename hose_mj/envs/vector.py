@@ -1,7 +1,5 @@
 """`VectorTaskEnv`: many copies of a task, stepped by one compiled call over all cores."""
 
-from __future__ import annotations
-
 import functools
 import os
 from collections.abc import Sequence
@@ -28,8 +26,7 @@ from hose_mj.tasks.task import Task
 
 _LEAST_COPIES = 128
 """With fewer copies for each core, one core is faster than several that wait for each other."""
-_PARTS = 4
-"""Parts of the copies for each core: some episodes take longer to start than others."""
+_PARTS = 4  # parts of the copies for each core: some episodes take longer to start than others
 
 Booleans = np.ndarray[Any, np.dtype[np.bool_]]
 Result = tuple[Any, Floats, Booleans, Booleans, dict[str, Any]]
@@ -43,16 +40,11 @@ class VectorTaskEnv(VectorEnv[Any, Any, Any]):
     whose action it ignores (`AutoresetMode.NEXT_STEP`).
 
     Args:
-        task: id of a task, or a task.
+        task, moves, observe, form, rewards, options: as in `TaskEnv`.
         num_envs: number of copies.
-        moves: "joint" or "turns", as in `TaskEnv`.
-        observe: names of the variables to show; None for all.
-        form: "array", "dict" or "index", as in `TaskEnv`.
-        rewards: reward signals whose sum is the reward; None for all.
         cores: how many to use; None for as many as there are with at least 128 copies for each.
             With 1 no thread is started (threads do not survive a fork of the process).
         render_mode: None; draw a single copy with `TaskEnv`.
-        options: options of the task.
 
     Raises:
         InputError: an unknown task, option or name, or a value outside its valid set.

@@ -1,7 +1,5 @@
 """`View`: the variables that are observed, as a Gymnasium space and as values in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Literal, get_args
 

@@ -2,17 +2,77 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
+from hose_mj.errors import HoseError, InputError
 from hose_mj.hoses.protocol import Array, Curve
+from hose_mj.toml_table import LARGEST_NUMBER
+
+_LARGEST_COUNT = 2**31 - 1
+"""MuJoCo counts steps in 32 bits."""
+_ODD = (TypeError, ValueError, OverflowError)
+"""What numpy raises for values that are no numbers, or numbers that no float holds."""
+_MALFORMED = (*_ODD, LookupError, AttributeError)
+Kind = TypeVar("Kind")
+
+
+def read_numbers(name: str, value: object, valid: str, largest: float = LARGEST_NUMBER) -> Array:
+    """Returns real numbers as a float array of any shape, of which some may not be finite.
+
+    Raises:
+        InputError: anything else (text, complex numbers, truth values, a ragged list), or a finite
+            number beyond `largest`, which no hose meets; its powers would overflow.
+    """
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iufO":
+            raise TypeError
+        numbers = array.astype(np.float64, copy=False)
+    except _ODD:
+        raise InputError(name, value, valid) from None
+    # What is not finite is left to the caller, who can say where it is.
+    if not (np.abs(numbers) <= largest).all() and np.isfinite(numbers).all():
+        raise InputError(name, value, f"{valid}, each at most {largest:g}")
+    return numbers
+
+
+def check_records(name: str, values: object, kind: type[Kind]) -> tuple[Kind, ...]:
+    """Returns a list or tuple of records of one class; raises `InputError` for anything else."""
+    if not isinstance(values, (list, tuple)):
+        raise InputError(name, values, f"a list of records of the class {kind.__name__}")
+    for value in values:
+        if not isinstance(value, kind):
+            raise InputError(name, value, f"records of the class {kind.__name__}")
+    return tuple(values)
+
+
+def restore_snapshot(state: object, before: Any, restore: Callable[[Any], None]) -> None:
+    """Restores a snapshot; the one taken before is restored where that cannot be done.
+
+    Raises:
+        InputError: a state that is no snapshot of what `restore` belongs to.
+    """
+    try:
+        restore(state)
+    except (HoseError, *_MALFORMED) as error:
+        restore(before)
+        if isinstance(error, HoseError):
+            raise
+        shown = sorted(map(str, state)) if isinstance(state, dict) else state
+        valid = f"what `snapshot` has returned ({type(error).__name__}: {error})"
+        raise InputError("state", shown, valid) from error
 
 
 def check_count(name: str, value: object, least: int, most: int | None = None) -> int:
     """Returns a whole number from `least` to `most`; raises `InputError` for anything else."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     count = int(value) if whole else least - 1  # type: ignore[call-overload]
+    if most is None and count > _LARGEST_COUNT:
+        most = _LARGEST_COUNT
     if count < least or (most is not None and count > most):
         end = f"at or above {least}" if most is None else f"from {least} to {most}"
         raise InputError(name, value, f"a whole number {end}")
@@ -21,24 +81,36 @@ def check_count(name: str, value: object, least: int, most: int | None = None) -
 
 def check_arc_lengths(arc_length: ArrayLike, length: float, what: str = "arc_length") -> Array:
     """Returns arc lengths as a float array (k,); raises `InputError` for one off the hose."""
-    try:
-        values = np.atleast_1d(np.asarray(arc_length, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError(what, arc_length, f"numbers on the hose, 0 to {length} m") from None
+    valid = f"numbers on the hose, 0 to {length} m"
+    values = np.atleast_1d(read_numbers(what, arc_length, valid, np.inf))
     if values.ndim != 1 or not np.all((values >= 0.0) & (values <= length)):
-        raise InputError(what, arc_length, f"numbers on the hose, 0 to {length} m")
+        raise InputError(what, arc_length, valid)
     return values
+
+
+def check_place(arc_length: ArrayLike, length: float) -> float:
+    """Returns one arc length; raises `InputError` unless it is one number on the hose."""
+    places = check_arc_lengths(arc_length, length)
+    if len(places) != 1:
+        raise InputError("arc_length", arc_length, f"one number, 0 to {length} m")
+    return float(places[0])
 
 
 def check_vector(name: str, value: ArrayLike) -> Array:
     """Returns a finite vector of shape (3,); raises `InputError` otherwise."""
-    try:
-        vector = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(name, value, "three finite numbers") from None
+    vector = read_numbers(name, value, "three finite numbers")
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
         raise InputError(name, value, "three finite numbers")
     return vector
+
+
+def check_rows(name: str, value: ArrayLike, count: int) -> Array:
+    """Returns finite numbers of shape (count, 3); raises `InputError` otherwise."""
+    valid = f"finite numbers, shape ({count}, 3)"
+    rows = read_numbers(name, value, valid)
+    if rows.shape != (count, 3) or not np.all(np.isfinite(rows)):
+        raise InputError(f"shape of {name}", rows.shape, valid)
+    return rows
 
 
 def sample_curve(curve: Curve, length: float, arc_lengths: Array) -> Array:
@@ -51,12 +123,12 @@ def sample_curve(curve: Curve, length: float, arc_lengths: Array) -> Array:
             2 times the hose's.
     """
     if callable(curve):
-        points = np.asarray(curve(arc_lengths), dtype=np.float64)
+        points = read_numbers("curve(arc_lengths)", curve(arc_lengths), "finite numbers (m)")
         if points.shape != (len(arc_lengths), 3):
             raise InputError("curve(arc_lengths)", points.shape, f"shape ({len(arc_lengths)}, 3)")
         check_curve_points(points)
         return points
-    points = np.asarray(curve, dtype=np.float64)
+    points = read_numbers("curve", curve, "finite numbers (m), or a function that returns them")
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
         raise InputError("curve", points.shape, "an array of shape (k, 3) with k >= 2")
     check_curve_points(points)
@@ -96,10 +168,7 @@ def sample_velocity(velocity: Curve, length: float, arc_lengths: Array) -> Array
     """
     valid = "finite numbers (m/s), shape (3,), or (m, 3) with m >= 2"
     values = velocity(arc_lengths) if callable(velocity) else velocity
-    try:
-        rows = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("velocity", values, valid) from None
+    rows = read_numbers("velocity", values, valid)
     if callable(velocity) and rows.shape != (len(arc_lengths), 3):
         raise InputError("velocity(arc_lengths)", rows.shape, f"shape ({len(arc_lengths)}, 3)")
     if rows.shape == (3,):

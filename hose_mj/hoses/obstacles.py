@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, check_choice
-from hose_mj.hoses.inputs import check_count, check_vector
+from hose_mj.hoses.inputs import check_count, check_vector, read_numbers
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec, check_number
 
@@ -54,8 +54,13 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         check_choice("kind of obstacle", self.kind, list(KINDS))
-        check_number("friction", self.friction, may_be_zero=True)
-        check_number("stiffness_factor", self.stiffness_factor)
+        friction = check_number("friction", self.friction, may_be_zero=True)
+        object.__setattr__(self, "friction", friction)
+        factor = check_number("stiffness_factor", self.stiffness_factor)
+        object.__setattr__(self, "stiffness_factor", factor)
+        ends = read_numbers("skips", self.skips, "two arc lengths (m)", np.inf)
+        if ends.shape != (2,) or np.isnan(ends).any():
+            raise InputError("skips", self.skips, "two arc lengths (m)")
         for name in ("position", "velocity", "angular_velocity"):
             object.__setattr__(self, name, _freeze(check_vector(name, getattr(self, name))))
         object.__setattr__(self, "rotation", _freeze(_check_rotation(self.rotation)))
@@ -158,7 +163,7 @@ def _freeze(array: Array) -> Array:
 
 
 def _check_rotation(rotation: ArrayLike) -> Array:
-    matrix = np.asarray(rotation, dtype=np.float64)
+    matrix = read_numbers("rotation", rotation, "an orthogonal, right-handed (3, 3) matrix")
     if matrix.shape == (9,):
         matrix = matrix.reshape(3, 3)
     right = matrix.shape == (3, 3) and bool(np.all(np.isfinite(matrix)))
@@ -173,10 +178,10 @@ def _check_rotation(rotation: ArrayLike) -> Array:
 
 def _check_size(kind: str, size: ArrayLike) -> Array:
     """Returns three sizes, those that the kind does not read set to 0."""
-    given = np.atleast_1d(np.asarray(size, dtype=np.float64))
     count = KINDS[kind]
-    if given.ndim != 1 or len(given) < count or not np.all(given[:count] > 0.0):
-        raise InputError(f"size of a {kind}", size, f"{count} finite numbers above 0 (m)")
-    if not np.all(np.isfinite(given[:count])):
-        raise InputError(f"size of a {kind}", size, f"{count} finite numbers above 0 (m)")
+    valid = f"{count} finite numbers above 0 (m)"
+    given = np.atleast_1d(read_numbers(f"size of a {kind}", size, valid))
+    read = given[:count] if given.ndim == 1 else given[:0]
+    if len(read) < count or not np.all((read > 0.0) & np.isfinite(read)):
+        raise InputError(f"size of a {kind}", size, valid)
     return np.concatenate([given[:count], np.zeros(3 - count)])

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import importlib
 import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, PackageNotFoundError, version
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from hose_mj.errors import InputError
-from hose_mj.hoses.protocol import HoseModel
-from hose_mj.hoses.spec import HoseSpec
-from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.errors import InputError, check_choice
+from hose_mj.hoses.spec import HoseSpec, check_spec
+from hose_mj.plugins import find_plugins, load_plugin, load_plugins
+
+if TYPE_CHECKING:
+    from hose_mj.hoses.protocol import HoseModel
 
 GROUP = "hose_mj.hoses"
 """Entry points of this group are hose models."""
@@ -147,10 +150,9 @@ def list_models() -> dict[str, ModelEntry]:
     """Returns all models by id: our own, then those of other packages.
 
     Raises:
-        InputError: a plug-in that cannot be imported or takes a name of ours.
+        InputError: a plug-in that takes a name of ours.
     """
-    plugins = find_plugins(GROUP, own=MODELS)
-    return {**MODELS, **{name: _read_plugin(entry) for name, entry in plugins.items()}}
+    return {**MODELS, **load_plugins(find_plugins(GROUP, own=MODELS), _read_plugin)}
 
 
 def find_model(model: str) -> ModelEntry:
@@ -159,11 +161,10 @@ def find_model(model: str) -> ModelEntry:
     Raises:
         InputError: an unknown model, or a plug-in that is broken.
     """
-    if model in MODELS:
+    if isinstance(model, str) and model in MODELS:
         return MODELS[model]
     plugins = find_plugins(GROUP, own=MODELS)
-    if model not in plugins:
-        raise InputError("model", model, "one of " + ", ".join([*MODELS, *plugins]))
+    check_choice("model", model, [*MODELS, *plugins])
     return _read_plugin(plugins[model])
 
 
@@ -175,6 +176,16 @@ def check_model(model: str) -> ModelEntry:
         others = [name for name, other in MODELS.items() if other.find_obstacle() is None]
         raise InputError("model", model, f"one of {', '.join(others)} ({obstacle})")
     return entry
+
+
+def check_options(
+    model: str, made: type[Any], options: Mapping[str, Any]
+) -> dict[str, inspect.Parameter]:
+    """Returns the keyword options of a model's class; raises `InputError` for an unknown one."""
+    parameters = dict(list(inspect.signature(made).parameters.items())[1:])
+    for name in options:
+        check_choice(f"option of {model}", name, parameters)
+    return parameters
 
 
 def _read_plugin(plugin: EntryPoint) -> ModelEntry:
@@ -198,11 +209,9 @@ def make_hose(model: str, spec: HoseSpec, **options: Any) -> HoseModel:
             that cannot be made with what is installed.
     """
     made = check_model(model).load()
-    parameters = dict(list(inspect.signature(made).parameters.items())[1:])
-    for name in options:
-        if name not in parameters:
-            raise InputError(f"option of {model}", name, "one of " + ", ".join(parameters))
+    check_spec(spec)
+    parameters = check_options(model, made, options)
     for name, parameter in parameters.items():
         if parameter.default is inspect.Parameter.empty and name not in options:
             raise InputError(f"options of {model}", sorted(options), f"with {name!r} among them")
-    return cast(HoseModel, made(spec, **options))
+    return cast("HoseModel", made(spec, **options))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-import sys
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import InitVar, dataclass, fields
+from numbers import Real
 from typing import Any
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, is_finite
 from hose_mj.hoses import materials
 
 POISSON_RATIO = 0.3
@@ -37,13 +37,13 @@ class Fitting:
     linear_density: float | None = None
 
     def __post_init__(self) -> None:
-        check_number("start of a fitting", self.start, may_be_zero=True)
-        check_number("end of a fitting", self.end)
+        for field in fields(self):
+            value, may_be_zero = getattr(self, field.name), field.name == "start"
+            if value is not None or field.name in ("start", "end"):
+                value = check_number(f"{field.name} of a fitting", value, may_be_zero=may_be_zero)
+                object.__setattr__(self, field.name, value)
         if self.end <= self.start:
             raise InputError("end of a fitting", self.end, f"above its start ({self.start} m)")
-        for field in fields(self)[2:]:
-            if getattr(self, field.name) is not None:
-                check_number(f"{field.name} of a fitting", getattr(self, field.name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,8 @@ class HoseSpec:
         second_bending_stiffness: EI about m2 (N m^2), for ribbons and flat cables; None for a hose
             that bends alike in every direction.
         torsional_stiffness: GJ (N m^2); left out (None) that of a round section of a material with
-            `POISSON_RATIO`, EI / 1.3; 0 for a hose that twists freely.
+            `POISSON_RATIO`, EI / 1.3, also after `dataclasses.replace` of EI; 0 for a hose that
+            twists freely.
         linear_density: mass per rest length (kg/m); the thesis's mu times A.
         outer_radius: (m), for drawing, contact and the section that MuJoCo implies. `radius`, its
             old name, goes on for one release with a DeprecationWarning.
@@ -72,6 +73,8 @@ class HoseSpec:
         fittings: stretches made otherwise; they may not overlap.
         damping_time: Kelvin-Voigt relaxation time tau (s): stress = E (strain + tau d strain/dt).
         drag: viscous force per rest length and velocity (N s/m^2).
+        default_torsion: for `dataclasses.replace` alone: the GJ that was filled in, None where it
+            was given.
 
     Raises:
         InputError: a value that is not finite, or not above zero where it must be.
@@ -90,23 +93,28 @@ class HoseSpec:
     damping_time: float = 0.0
     drag: float = 0.0
     fittings: tuple[Fitting, ...] = ()
+    default_torsion: InitVar[float | None] = None
 
-    def __post_init__(self) -> None:
-        if self.torsional_stiffness is None:
-            check_number("bending_stiffness", self.bending_stiffness)
-            round_section = self.bending_stiffness / (1.0 + POISSON_RATIO)
-            object.__setattr__(self, "torsional_stiffness", round_section)
+    def __post_init__(self, default_torsion: float | None) -> None:
+        given = self.torsional_stiffness
+        if given is None or (isinstance(given, float) and given == default_torsion):
+            stiffness = check_number("bending_stiffness", self.bending_stiffness)
+            default_torsion = stiffness / (1.0 + POISSON_RATIO)
+            object.__setattr__(self, "torsional_stiffness", default_torsion)
+            object.__setattr__(self, "default_torsion", default_torsion)
         for field in fields(self):
+            value = getattr(self, field.name)
             if field.name == "fittings":
                 continue
-            if field.name == "second_bending_stiffness" and self.second_bending_stiffness is None:
+            if field.name == "second_bending_stiffness" and value is None:
                 continue
-            check_number(
+            number = check_number(
                 field.name,
-                getattr(self, field.name),
+                value,
                 may_be_zero=field.name in _MAY_BE_ZERO,
                 may_be_negative=field.name in _MAY_BE_NEGATIVE,
             )
+            object.__setattr__(self, field.name, number)
         if self.rest_strain <= -1.0:
             raise InputError("rest_strain", self.rest_strain, "a number above -1")
         parts = self.fittings
@@ -150,11 +158,11 @@ class HoseSpec:
         Raises:
             InputError: a value outside its range.
         """
-        check_number("youngs_modulus", youngs_modulus)
-        check_number("density", density)
-        check_number("outer_radius", outer_radius)
-        check_number("inner_radius", inner_radius, may_be_zero=True)
-        check_number("poisson_ratio", poisson_ratio, may_be_zero=True, may_be_negative=True)
+        youngs_modulus = check_number("youngs_modulus", youngs_modulus)
+        density = check_number("density", density)
+        outer_radius = check_number("outer_radius", outer_radius)
+        inner_radius = check_number("inner_radius", inner_radius, may_be_zero=True)
+        poisson_ratio = check_number("poisson_ratio", poisson_ratio, may_be_negative=True)
         if not -1.0 < poisson_ratio <= 0.5:
             raise InputError("poisson_ratio", poisson_ratio, "a number in (-1, 0.5]")
         if inner_radius >= outer_radius:
@@ -283,15 +291,25 @@ def complete_section(numbers: Mapping[str, float]) -> dict[str, float]:
     return made
 
 
+def check_spec(spec: object) -> None:
+    """Raises `InputError` for what is no `HoseSpec`."""
+    if not isinstance(spec, HoseSpec):
+        raise InputError("spec", spec, "a HoseSpec")
+
+
 def check_number(
     name: str, value: object, *, may_be_zero: bool = False, may_be_negative: bool = False
-) -> None:
-    """Raises `InputError` unless `value` is a finite number of the wanted sign."""
+) -> float:
+    """Returns a number, one of numpy's as a float.
+
+    Raises:
+        InputError: anything but a finite number of the wanted sign.
+    """
     sign = "" if may_be_negative else (" at or above 0" if may_be_zero else " above 0")
-    valid = f"a finite number{sign}"
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(name, value, valid)
-    if not abs(value) <= sys.float_info.max:  # nor is a whole number that no float holds
-        raise InputError(name, value, valid)
-    if (value < 0 and not may_be_negative) or (value == 0 and not (may_be_zero or may_be_negative)):
-        raise InputError(name, value, valid)
+    # A whole number may be one that no float holds.
+    if isinstance(value, bool) or not isinstance(value, Real) or not is_finite(value):
+        raise InputError(name, value, f"a finite number{sign}")
+    number = value if isinstance(value, int) else float(value)
+    if not may_be_negative and (number < 0 or (number == 0 and not may_be_zero)):
+        raise InputError(name, value, f"a finite number{sign}")
+    return number

@@ -4,8 +4,6 @@ The top level of each has `command`, `version`, `revision`, `machine`, `seed` an
 `checks` in a command that checks something; and the command's own results beside them.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -16,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol, TextIO
+from typing import Any, Protocol
 
 from hose_mj import version
 from hose_mj.errors import InputError
@@ -70,9 +68,10 @@ def make_document(
     return document
 
 
-def print_document(document: Mapping[str, Any], stream: TextIO | None = None) -> None:
-    """Prints a document on stdout, or on another stream; see `format_document`."""
-    print(format_document(document), file=stream or sys.stdout, flush=True)
+def print_document(document: Mapping[str, Any]) -> None:
+    """Prints a document on stdout; see `format_document`."""
+    sys.stdout.write(f"{format_document(document)}\n")
+    sys.stdout.flush()
 
 
 def format_document(document: Mapping[str, Any]) -> str:

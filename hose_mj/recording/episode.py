@@ -3,8 +3,6 @@
 Nothing here reads or writes a file. Arrays are copied, made float64 and locked on construction.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 
@@ -20,25 +18,15 @@ _SCENE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True, eq=False)
 class HoseTrack:
-    """One hose over time.
+    """One hose over time."""
 
-    Attributes:
-        name: what the reader calls it ("geds, 16 points"); unique in its scene.
-        arc_lengths: where the points sit along the hose at rest, (m,), rising, m >= 2 (m).
-        times: simulated time of each sample, (k,), rising (s).
-        points: centre line in the world frame, (k, m, 3) (m).
-        radius: of the hose (m).
-        color: red, green, blue, 0 to 255; see `palette`.
-        tension: axial force, positive in tension, (k, m), or None (N).
-    """
-
-    name: str
-    arc_lengths: Array
-    times: Array
-    points: Array
-    radius: float
-    color: Rgb
-    tension: Array | None = None
+    name: str  # what the reader calls it ("geds, 16 points"); unique in its scene
+    arc_lengths: Array  # where the points sit along the hose at rest, (m,), rising, m >= 2 (m)
+    times: Array  # simulated time of each sample, (k,), rising (s)
+    points: Array  # centre line in the world frame, (k, m, 3) (m)
+    radius: float  # of the hose (m)
+    color: Rgb  # red, green, blue, 0 to 255; see `palette`
+    tension: Array | None = None  # axial force, positive in tension, (k, m), or None (N)
 
     def __post_init__(self) -> None:
         what = f"track {self.name!r}"
@@ -58,24 +46,16 @@ class HoseTrack:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One number over time, such as the distance between two models.
+    """One number over time, such as the distance between two models."""
 
-    Attributes:
-        name: what the reader calls it; unique in its scene. It takes the colour of the model that
-            it starts with, if any.
-        times: (k,), rising (s).
-        values: (k,), finite.
-        unit: "m", "N", ..., "" for a plain number. Series of one unit share a plot.
-        limit: a bound drawn as a line, or None.
-        color: overrides the colour that goes with the name.
-    """
-
+    # What the reader calls it; unique in its scene. It takes the colour of the model that it starts
+    # with, if any.
     name: str
-    times: Array
-    values: Array
-    unit: str = ""
-    limit: float | None = None
-    color: Rgb | None = None
+    times: Array  # (k,), rising (s)
+    values: Array  # (k,), finite
+    unit: str = ""  # "m", "N", ..., "" for a plain number. Series of one unit share a plot
+    limit: float | None = None  # a bound drawn as a line, or None
+    color: Rgb | None = None  # overrides the colour that goes with the name
 
     def __post_init__(self) -> None:
         what = f"series {self.name!r}"
@@ -91,21 +71,13 @@ class Series:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Hoses and numbers that are shown together: one case of a comparison, or one episode.
+    """Hoses and numbers that are shown together: one case of a comparison, or one episode."""
 
-    Attributes:
-        name: short and stable, letters, digits, ".", "_" and "-" ("tip-load").
-        title: for the reader.
-        tracks: the hoses, overlaid; at least one.
-        series: the numbers below them.
-        note: a few sentences in Markdown on what is to be seen.
-    """
-
-    name: str
-    title: str
-    tracks: tuple[HoseTrack, ...]
-    series: tuple[Series, ...] = ()
-    note: str = ""
+    name: str  # short and stable, letters, digits, ".", "_" and "-" ("tip-load")
+    title: str  # for the reader
+    tracks: tuple[HoseTrack, ...]  # the hoses, overlaid; at least one
+    series: tuple[Series, ...] = ()  # the numbers below them
+    note: str = ""  # a few sentences in Markdown on what is to be seen
 
     def __post_init__(self) -> None:
         if not _SCENE_NAME.fullmatch(self.name):

@@ -1,7 +1,5 @@
 """Files that are either whole or absent: written beside their place, synced, then moved there."""
 
-from __future__ import annotations
-
 import os
 import secrets
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An episode on a grid, in memory: what stands where at each turn, rewards, events; see `rerun`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,45 +13,29 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class GridTrack:
-    """Something that stands on a cell, over time.
+    """Something that stands on a cell, over time."""
 
-    Attributes:
-        name: unique in its episode ("robot_0").
-        label: shown beside it.
-        color: red, green, blue, 0 to 255.
-        points: where it is at each turn, in cells, x to the right and y upwards (k, 2).
-    """
-
-    name: str
-    label: str
-    color: Rgb
-    points: Array
+    name: str  # unique in its episode ("robot_0")
+    label: str  # shown beside it
+    color: Rgb  # red, green, blue, 0 to 255
+    points: Array  # where it is at each turn, in cells, x to the right and y upwards (k, 2)
 
 
 @dataclass(frozen=True, eq=False)
 class GridEpisode:
     """One episode of k turns, the starting state counted as the first.
 
-    Attributes:
-        title: of the task.
-        turns: moves since the start, rising (k,).
-        lines: of the grid and its walls, each two points, in cells (n, 2, 2).
-        tracks: what stands on the grid.
-        hose: corners of the hose (k, m, 2); None without one.
-        rewards: of the step that led to each turn (k,).
-        events: names of what happened in that step, in one text (k,).
-
     Raises:
         InputError: not as many entries as turns, turns that do not rise, or two tracks of one name.
     """
 
-    title: str
-    turns: NDArray[np.int64]
-    lines: Array
-    tracks: tuple[GridTrack, ...]
-    hose: Array | None
-    rewards: Array
-    events: tuple[str, ...]
+    title: str  # of the task
+    turns: NDArray[np.int64]  # moves since the start, rising (k,)
+    lines: Array  # of the grid and its walls, each two points, in cells (n, 2, 2)
+    tracks: tuple[GridTrack, ...]  # what stands on the grid
+    hose: Array | None  # corners of the hose (k, m, 2); None without one
+    rewards: Array  # of the step that led to each turn (k,)
+    events: tuple[str, ...]  # names of what happened in that step, in one text (k,)
 
     def __post_init__(self) -> None:
         if len(self.turns) == 0 or np.any(np.diff(self.turns) <= 0):
@@ -66,6 +48,5 @@ class GridEpisode:
             lengths["hose"] = len(self.hose)
         for name, length in lengths.items():
             if length != len(self.turns):
-                raise InputError(
-                    f"length of {name}", length, f"{len(self.turns)}, one for each turn"
-                )
+                valid = f"{len(self.turns)}, one for each turn"
+                raise InputError(f"length of {name}", length, valid)

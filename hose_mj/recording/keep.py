@@ -1,7 +1,5 @@
 """Which recordings of a run stay: the last few, the best, the first success, the first breaks."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -17,19 +15,12 @@ LAST, BEST, FIRST_SUCCESS = "last", "best", "first success"
 
 @dataclass(frozen=True)
 class Played:
-    """An episode that has ended.
+    """An episode that has ended."""
 
-    Attributes:
-        number: counts up from 0.
-        total_reward: of all agents together.
-        success: whether it reached its goal.
-        breaks: kinds of the constraints that broke.
-    """
-
-    number: int
-    total_reward: float
-    success: bool
-    breaks: tuple[str, ...] = ()
+    number: int  # counts up from 0
+    total_reward: float  # of all agents together
+    success: bool  # whether it reached its goal
+    breaks: tuple[str, ...] = ()  # kinds of the constraints that broke
 
 
 class Keep:

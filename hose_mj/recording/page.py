@@ -84,9 +84,8 @@ class Block:
         """
         for number, row in enumerate(rows):
             if len(row) != len(header):
-                raise InputError(
-                    f"length of row {number}", len(row), f"{len(header)}, as the header"
-                )
+                valid = f"{len(header)}, as the header"
+                raise InputError(f"length of row {number}", len(row), valid)
         cells = [[format_value(value) for value in row] for row in rows]
         right = [is_numeric([row[column] for row in cells]) for column in range(len(header))]
         body = "".join(f"{_format_row('td', row, right)}\n" for row in cells)

@@ -5,13 +5,10 @@ on white paper as well as on the viewer's dark ground. A model that is not liste
 plug-in, has a spare colour.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
-Rgb = tuple[int, int, int]
-"""Red, green, blue, each 0 to 255."""
+Rgb = tuple[int, int, int]  # red, green, blue, each 0 to 255
 
 COLORS: dict[str, Rgb] = {
     "geds": (0, 114, 178),
@@ -21,14 +18,7 @@ COLORS: dict[str, Rgb] = {
     "hinge-chain": (204, 121, 167),
     "reference": (127, 127, 127),
 }
-MARKERS: dict[str, str] = {
-    "geds": "o",
-    "geds planar": "v",
-    "cable": "s",
-    "flex": "^",
-    "hinge-chain": "D",
-    "reference": "x",
-}
+MARKERS: dict[str, str] = dict(zip(COLORS, "ovs^Dx", strict=True))
 NAMES: dict[str, str] = {
     "geds": "GEDS",
     "geds planar": "GEDS planar",
@@ -39,9 +29,7 @@ NAMES: dict[str, str] = {
 LIMIT: Rgb = (160, 40, 40)
 OTHERS: tuple[Rgb, ...] = ((230, 159, 0), (0, 114, 178), (120, 94, 200), (100, 100, 60))
 
-
-LOWEST_TENSION = -0.25
-"""Lowest tension that has a colour of its own, as a fraction of the limit."""
+LOWEST_TENSION = -0.25  # lowest tension that has a colour of its own, as a fraction of the limit
 _FRACTIONS = np.array([LOWEST_TENSION, 0.0, 0.35, 0.7, 1.0])
 _TENSION_COLORS = np.array(
     [[60, 120, 230], [214, 222, 230], [248, 214, 70], [244, 130, 30], [214, 30, 40]],
@@ -101,9 +89,7 @@ def color_tension(tension: NDArray[np.float64], limit: float) -> NDArray[np.uint
     return np.stack(parts, axis=-1).round().astype(np.uint8)
 
 
-def make_tension_scale(
-    limit: float, width: int = 400
-) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Returns the colours from lowest to limit, (width, 3), and round tensions to label, N."""
-    colors = color_tension(np.linspace(LOWEST_TENSION * limit, limit, width), limit)
+def make_tension_scale(limit: float) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Returns the colours from lowest to limit, (400, 3), and round tensions to label, N."""
+    colors = color_tension(np.linspace(LOWEST_TENSION * limit, limit, 400), limit)
     return colors, limit * np.array([LOWEST_TENSION, 0.0, 0.25, 0.5, 0.75, 1.0])

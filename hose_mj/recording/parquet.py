@@ -71,25 +71,6 @@ def write_columns(columns: Mapping[str, npt.NDArray[Any]], parquet_path: Path) -
     _write_parquet(load_pyarrow().table(dict(columns)), parquet_path)
 
 
-def read_records(parquet_path: Path) -> tuple[list[Record], dict[str, str]]:
-    """Returns the records and the metadata of a file that `write_records` made.
-
-    Raises:
-        InputError: no such file, or not Parquet.
-    """
-    pa = load_pyarrow()
-    try:
-        table = pa.parquet.read_table(Path(parquet_path))
-    except (OSError, pa.ArrowException) as error:
-        raise InputError("Parquet file", str(parquet_path), "a readable Parquet file") from error
-    metadata = {
-        key.decode(): value.decode()
-        for key, value in (table.schema.metadata or {}).items()
-        if not key.startswith((b"ARROW:", b"pandas"))
-    }
-    return table.to_pylist(), metadata
-
-
 def make_table(rows: list[Record], types: dict[str, type], metadata: dict[str, str]) -> Any:
     """Builds the Arrow table of plain rows."""
     pa = load_pyarrow()

@@ -3,8 +3,6 @@
 Plain data in the world frame, SI units. Quaternions are w, x, y, z.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -22,36 +20,25 @@ from hose_mj.recording.episode import (
 from hose_mj.recording.palette import Rgb
 
 GEOM_KINDS = ("plane", "box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh")
-WORLD = -1
-"""Body of what does not move."""
+WORLD = -1  # body of what does not move
 Rgba = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
 class Geom:
-    """One shape, in the frame of a body.
+    """One shape, in the frame of a body."""
 
-    Attributes:
-        name: unique in its scene.
-        kind: one of `GEOM_KINDS`.
-        size: as MuJoCo has it, (3,), m: box, plane and ellipsoid half sizes; sphere radius;
-            capsule and cylinder radius and half length (along z); mesh none.
-        color: red, green, blue, opacity, 0 to 255.
-        body: index into the scene's bodies, or `WORLD`.
-        position: (3,), m.
-        quaternion: (4,).
-        vertices: of a mesh, (v, 3), m; None for other kinds.
-        faces: triangles of a mesh, indices of vertices (f, 3); None for other kinds.
-    """
-
-    name: str
-    kind: str
+    name: str  # unique in its scene
+    kind: str  # one of `GEOM_KINDS`
+    # As MuJoCo has it, (3,), m: box, plane and ellipsoid half sizes; sphere radius; capsule and
+    # cylinder radius and half length (along z); mesh none.
     size: Array
-    color: Rgba
-    body: int
-    position: Array
-    quaternion: Array
-    vertices: Array | None = None
+    color: Rgba  # red, green, blue, opacity, 0 to 255
+    body: int  # index into the scene's bodies, or `WORLD`
+    position: Array  # (3,), m
+    quaternion: Array  # (4,)
+    vertices: Array | None = None  # of a mesh, (v, 3), m; None for other kinds
+    # Triangles of a mesh, indices of vertices (f, 3); None for other kinds.
     faces: Array | None = None
 
     def __post_init__(self) -> None:
@@ -78,19 +65,12 @@ class Geom:
 
 @dataclass(frozen=True)
 class Margin:
-    """A distance to a limit, which is at 0; positive is fine.
+    """A distance to a limit, which is at 0; positive is fine."""
 
-    Attributes:
-        name: for the reader ("stretch 0"); unique in its scene.
-        kind: which constraint it watches.
-        unit: "N" or "m".
-        limit: what 0 means, in words ("at most 120 N"); may be empty.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    limit: str = ""
+    name: str  # for the reader ("stretch 0"); unique in its scene
+    kind: str  # which constraint it watches
+    unit: str  # "N" or "m"
+    limit: str = ""  # what 0 means, in words ("at most 120 N"); may be empty
 
     def __post_init__(self) -> None:
         check_name("name of a margin", self.name)
@@ -98,61 +78,37 @@ class Margin:
 
 
 class KindStyle(NamedTuple):
-    """The look of a kind of constraint in plots; a kind without a style takes a spare colour.
+    """The look of a kind of constraint in plots; a kind without a style takes a spare colour."""
 
-    Attributes:
-        name: of the kind, as `Margin.kind` has it.
-        unit: of its margins, "N" or "m".
-        color: of its lines.
-    """
-
-    name: str
-    unit: str
-    color: Rgb
+    name: str  # of the kind, as `Margin.kind` has it
+    unit: str  # of its margins, "N" or "m"
+    color: Rgb  # of its lines
 
 
 @dataclass(frozen=True, eq=False)
 class SceneDescription:
-    """Everything of an episode in a world that is seen and stays as it is.
+    """Everything of an episode in a world that is seen and stays as it is."""
 
-    Attributes:
-        name: of the hose model, or whatever tells two episodes apart; unique where two are shown.
-        title: for the reader.
-        geoms: the scene's shapes; names unique.
-        bodies: names of the bodies that move and have geoms, unique (B,).
-        robots: names, the tip's robot first (N,).
-        goal: shape of the goal, in no body.
-        arc_lengths: where the hose is sampled, rising (P,), m.
-        hose_radius: m.
-        tension_limit: what the hose may bear, N; the scale of its colours.
-        margins: what the constraint monitor measures (M,).
-        n_control_points: C, 0 if the hose has none.
-        low, high: corners of the space worth looking at, (3,) each, finite, m.
-        bounds: lowest and highest place for the robots, (2, 3), infinite where there is no bound.
-        settings: shown beside it, in this order.
-        source: where the hose begins, (3,), m.
-        cell: width of the squares drawn on the ground around the source, m; 0 for none.
-        kinds: how the kinds of the margins are shown.
-    """
-
-    name: str
-    title: str
-    geoms: tuple[Geom, ...]
-    bodies: tuple[str, ...]
-    robots: tuple[str, ...]
-    goal: Geom
-    arc_lengths: Array
-    hose_radius: float
-    tension_limit: float
-    margins: tuple[Margin, ...]
-    n_control_points: int
+    name: str  # of the hose model, or whatever tells two episodes apart; unique where two are shown
+    title: str  # for the reader
+    geoms: tuple[Geom, ...]  # the scene's shapes; names unique
+    bodies: tuple[str, ...]  # names of the bodies that move and have geoms, unique (B,)
+    robots: tuple[str, ...]  # names, the tip's robot first (N,)
+    goal: Geom  # shape of the goal, in no body
+    arc_lengths: Array  # where the hose is sampled, rising (P,), m
+    hose_radius: float  # m
+    tension_limit: float  # what the hose may bear, N; the scale of its colours
+    margins: tuple[Margin, ...]  # what the constraint monitor measures (M,)
+    n_control_points: int  # C, 0 if the hose has none
+    # low, high: corners of the space worth looking at, (3,) each, finite, m.
     low: Array
     high: Array
+    # Lowest and highest place for the robots, (2, 3), infinite where there is no bound.
     bounds: Array
-    source: Array
-    settings: dict[str, str] = field(default_factory=dict)
-    cell: float = 0.0
-    kinds: tuple[KindStyle, ...] = ()
+    source: Array  # where the hose begins, (3,), m
+    settings: dict[str, str] = field(default_factory=dict)  # shown beside it, in this order
+    cell: float = 0.0  # width of the squares drawn on the ground around the source, m; 0 for none
+    kinds: tuple[KindStyle, ...] = ()  # how the kinds of the margins are shown
 
     def __post_init__(self) -> None:
         check_name("name of a scene", self.name)

@@ -1,7 +1,5 @@
 """`Sink`: where an episode goes while it runs; `Background`: a sink that never holds up the run."""
 
-from __future__ import annotations
-
 import queue
 import sys
 import threading

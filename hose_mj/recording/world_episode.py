@@ -4,8 +4,6 @@ Plain data, whatever simulated it; nothing here reads or writes a file. World fr
 Samples are rows of one structured array: appending copies numbers and makes no objects.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,8 +14,7 @@ from hose_mj.errors import InputError
 from hose_mj.recording.episode import Array, check_name, check_rising, check_shape, lock_array
 from hose_mj.recording.scene_description import SceneDescription
 
-NO_TURN = -1
-"""Turn of a sample of an episode that has none."""
+NO_TURN = -1  # turn of a sample of an episode that has none
 
 
 def make_row_type(scene: SceneDescription) -> np.dtype[Any]:
@@ -49,19 +46,13 @@ def make_row_type(scene: SceneDescription) -> np.dtype[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A stretch of an episode, k samples.
+    """A stretch of an episode, k samples."""
 
-    Attributes:
-        rows: see `make_row_type`, (k,), times rising, numbers finite but for the margins.
-        owners: whose turn it was, "" for nobody's, (k,).
-        vetoed: the actions vetoed, in one text, "" for none, (k,).
-        events: what happened, in one text, "" for nothing, (k,).
-    """
-
+    # See `make_row_type`, (k,), times rising, numbers finite but for the margins.
     rows: NDArray[Any]
-    owners: tuple[str, ...]
-    vetoed: tuple[str, ...]
-    events: tuple[str, ...]
+    owners: tuple[str, ...]  # whose turn it was, "" for nobody's, (k,)
+    vetoed: tuple[str, ...]  # the actions vetoed, in one text, "" for none, (k,)
+    events: tuple[str, ...]  # what happened, in one text, "" for nothing, (k,)
 
     def __post_init__(self) -> None:
         check_rising("times of the samples", self.rows["time"])
@@ -92,20 +83,13 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class BreakMark:
-    """A broken constraint: which, where and when.
+    """A broken constraint: which, where and when."""
 
-    Attributes:
-        kind: "stretch", "collision", ...
-        time: s.
-        place: (3,), m.
-        text: one line for the reader.
-        record: all that is known of it, plain JSON values.
-    """
-
-    kind: str
-    time: float
-    place: Array
-    text: str
+    kind: str  # "stretch", "collision", ...
+    time: float  # s
+    place: Array  # (3,), m
+    text: str  # one line for the reader
+    # All that is known of it, plain JSON values.
     record: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -1,7 +1,5 @@
 """An episode in a world as a table: one row a sample, to be read by a spreadsheet."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

@@ -19,29 +19,20 @@ from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
 MOVES = ("up", "down", "left", "right")
-KEEP = 0.7
-"""How likely a robot that moves again goes on as before: random walks would stay at home."""
+KEEP = 0.7  # how likely a robot that moves again goes on as before: random walks would stay at home
 Move = tuple[int, str]
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a sequence ended in one model.
+    """How a sequence ended in one model."""
 
-    Attributes:
-        kind: of the break; "none" without one, "error" where the model could not go on.
-        turn: number of the last move, from 0.
-        robot: that made it; None for the kind "none".
-        cell: that the robot set out from in it; None for the kind "none".
-        text: what happened, in words.
-        least: per move the least margin of each kind, N for stretch and m for the others.
-    """
-
-    kind: str
-    turn: int
-    robot: int | None
-    cell: tuple[int, int] | None
-    text: str
+    kind: str  # of the break; "none" without one, "error" where the model could not go on
+    turn: int  # number of the last move, from 0
+    robot: int | None  # that made it; None for the kind "none"
+    cell: tuple[int, int] | None  # that the robot set out from in it; None for the kind "none"
+    text: str  # what happened, in words
+    # Per move the least margin of each kind, N for stretch and m for the others.
     least: tuple[dict[str, float], ...]
 
     def agrees(self, other: Ending) -> bool:
@@ -126,15 +117,10 @@ def play_all(
 
 @dataclass(frozen=True)
 class EndingsFile:
-    """Endings of one model in a file, so that a command that was stopped goes on.
+    """Endings of one model in a file, so that a command that was stopped goes on."""
 
-    Attributes:
-        path: of the file; None to keep nothing.
-        settings: what the endings depend on, of plain JSON values.
-    """
-
-    path: Path | None
-    settings: dict[str, Any]
+    path: Path | None  # of the file; None to keep nothing
+    settings: dict[str, Any]  # what the endings depend on, of plain JSON values
 
     def read(self) -> list[Ending]:
         """The endings kept so far; `InputError` where they are of other settings."""

@@ -24,8 +24,7 @@ from hose_mj.world.scene_geoms import KIND_NAMES
 from hose_mj.world.world import World
 
 KIND_STYLES = tuple(scene_description.KindStyle(kind.name, kind.unit, kind.color) for kind in KINDS)
-N_POINTS = 81
-"""Points along the hose that are recorded."""
+N_POINTS = 81  # points along the hose that are recorded
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows geoms and sites of groups 0, 1 and 2
 _ELLIPSOID, _MESH = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID), int(mujoco.mjtGeom.mjGEOM_MESH)
 _KINDS = {**KIND_NAMES, _ELLIPSOID: "ellipsoid", _MESH: "mesh"}
@@ -253,21 +252,13 @@ class Capture:
     Args:
         sinks: where samples go: files, live viewers; see `hose_mj.recording`.
         keep: whether to keep the whole episode as well, see `episode`.
-        most: samples kept at most, see `SampleBuffer`.
-        n_points: points along the hose.
 
     Attributes:
         scene: of the running episode.
     """
 
-    def __init__(
-        self,
-        sinks: Sequence[Sink] = (),
-        keep: bool = False,
-        most: int = 20_000,
-        n_points: int = N_POINTS,
-    ) -> None:
-        self._sinks, self._keep, self._most, self._n_points = tuple(sinks), keep, most, n_points
+    def __init__(self, sinks: Sequence[Sink] = (), keep: bool = False) -> None:
+        self._sinks, self._keep = tuple(sinks), keep
         self._is_live = any(getattr(sink, "lossy", False) for sink in sinks)
         self.scene: SceneDescription | None = None
         self._bodies: SceneBodies | None = None
@@ -284,10 +275,10 @@ class Capture:
         The world is read once for nothing, so that what numba compiles when it is first called is
         compiled before the episode runs.
         """
-        self.scene, self._bodies = describe_scene(world, monitor, settings or {}, self._n_points)
+        self.scene, self._bodies = describe_scene(world, monitor, settings or {})
         self._reader = HoseReader(world, self.scene.arc_lengths)
         self._chunk = SampleBuffer(self.scene, LIVE_CHUNK if self._is_live else CHUNK)
-        self._kept = SampleBuffer(self.scene, self._most) if self._keep else None
+        self._kept = SampleBuffer(self.scene) if self._keep else None
         self._outcome = None
         self._read(world)
         for sink in self._sinks:
@@ -380,10 +371,5 @@ def make_mark(broken: Any | None) -> world_episode.BreakMark | None:
     """Turns a `Break` into what a recording shows of it."""
     if broken is None:
         return None
-    return world_episode.BreakMark(
-        broken.kind,
-        broken.time,
-        np.array(broken.place),
-        f"{broken.kind}: {broken.describe()}",
-        broken.to_record(),
-    )
+    place, text = np.array(broken.place), f"{broken.kind}: {broken.describe()}"
+    return world_episode.BreakMark(broken.kind, broken.time, place, text, broken.to_record())

@@ -6,8 +6,6 @@ from hose_mj.rollout.dm_world import load
 viewer.launch(load("floor_2"))
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +30,9 @@ try:
 except ImportError as error:
     raise MissingExtra("cable", "a world as a dm_control environment") from error
 
-HOSE = "shown_hose/"
-"""Prefix of the bodies that show a hose that is not part of MuJoCo's model."""
+HOSE = "shown_hose/"  # prefix of the bodies that show a hose that is not part of MuJoCo's model
 N_PIECES = 60
-N_POINTS = 33
-"""Points along the hose in an observation."""
+N_POINTS = 33  # points along the hose in an observation
 
 
 class WorldPhysics(dm_mujoco.Physics):
@@ -74,9 +70,8 @@ class WorldPhysics(dm_mujoco.Physics):
     def reset(self, keyframe_id: int | None = None) -> None:
         """Returns to the start of the scene, the only one; `InputError` for a keyframe."""
         if keyframe_id is not None:
-            raise InputError(
-                "keyframe_id", keyframe_id, "None: a world starts where its scene does"
-            )
+            valid = "None: a world starts where its scene does"
+            raise InputError("keyframe_id", keyframe_id, valid)
         self.world.reset()
         self.monitor.reset()
         self.broken = None

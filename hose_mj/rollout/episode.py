@@ -13,18 +13,13 @@ from hose_mj.errors import InputError
 from hose_mj.world.world import World
 
 EndedBy = Literal["break", "goal", "duration"]
-SAMPLE_RATE = 25.0
-"""Samples per simulated second: what a film shows."""
+SAMPLE_RATE = 25.0  # samples per simulated second: what a film shows
 
 
 class Policy(Protocol):
-    """What chooses the motors' controls.
+    """What chooses the motors' controls."""
 
-    Attributes:
-        ends_at_goal: whether the episode is over when the tip is at the goal.
-    """
-
-    ends_at_goal: bool
+    ends_at_goal: bool  # whether the episode is over when the tip is at the goal
 
     def start(self, world: World, monitor: Monitor, generator: np.random.Generator) -> None:
         """Called once, at the state in which the episode starts."""
@@ -65,16 +60,13 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How an episode ended, with which break, if any, and how long it took, simulated (s).
-
-    `stalled` counts the actions that robots gave up.
-    """
+    """How an episode ended, with which break, if any, and how long it took, simulated (s)."""
 
     steps: int
     sim_time: float
     ended_by: EndedBy
     broken: Break | None
-    stalled: int
+    stalled: int  # actions that robots gave up
 
 
 def is_at_goal(world: World) -> bool:

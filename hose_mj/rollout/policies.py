@@ -9,8 +9,6 @@ it is one of MuJoCo's, which takes far longer, they are tried on a spline hose i
 and what does there as wanted is then tried on the world itself: not all carries over.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -35,8 +33,7 @@ from hose_mj.world.world import World
 
 Cell = tuple[int, int, int]
 HOSE_SAMPLES = 129
-_CLEARANCE = 0.15
-"""Distance kept to obstacles, as a share of a cell."""
+_CLEARANCE = 0.15  # distance kept to obstacles, as a share of a cell
 
 
 class FreeCells:
@@ -135,19 +132,12 @@ class FreeCells:
 
 @dataclass(frozen=True)
 class GoalPlan:
-    """How the tip is brought to the goal.
+    """How the tip is brought to the goal."""
 
-    Attributes:
-        rise: cells by which robots that can rise do so first; a hose that hangs low catches.
-        avoid: whether the tip avoids the hose; where it is all around, there is no such way.
-        pace: how fast, as a share of what the robots can.
-        slack: share of a segment that two neighbours may be apart.
-    """
-
-    rise: int
-    avoid: bool
-    pace: float
-    slack: float
+    rise: int  # cells by which robots that can rise do so first; a hose that hangs low catches
+    avoid: bool  # whether the tip avoids the hose; where it is all around, there is no such way
+    pace: float  # how fast, as a share of what the robots can
+    slack: float  # share of a segment that two neighbours may be apart
 
     def make_script(self, driver: Driver) -> Script | None:
         """The tip goes to the goal by the shortest free way; the others follow its trail.
@@ -364,24 +354,19 @@ def make_policy(name: str) -> Policy:
 
 SLOW_MODELS = ("cable", "flex")
 MOST_TRIALS = 24
-LONGEST, LONGEST_OF_ALL = 5.0, 20.0
-"""Simulated time of a trial, and of all, at most (s)."""
+LONGEST, LONGEST_OF_ALL = 5.0, 20.0  # simulated time of a trial, and of all, at most (s)
 SLOWNESS = 4.0
 """How often time simulated with one of MuJoCo's hoses counts: it takes several times as long."""
-PATIENCE = 1.5
-"""How much longer than its targets take a trial goes on, and a second more."""
+PATIENCE = 1.5  # how much longer than its targets take a trial goes on, and a second more
 
 
 @dataclass(frozen=True)
 class RehearsedScript:
-    """A script that was played, its first break, if any, and when it ended (s).
-
-    `at_goal` says whether the tip reached the goal before.
-    """
+    """A script that was played, its first break, if any, and when it ended (s)."""
 
     script: Script
     broken: Break | None
-    at_goal: bool
+    at_goal: bool  # whether the tip reached the goal before
     time: float
 
 

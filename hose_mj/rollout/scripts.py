@@ -4,8 +4,6 @@
 the likeliest first, from a scene's geometry.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import permutations
@@ -25,16 +23,11 @@ class Script:
 
     Between two formations all robots move straight and arrive together, so two that are near enough
     for their hose in both formations are so in between (a distance is a convex function).
-
-    Attributes:
-        robot: the one it is about.
-        formations: (k, N, 3), m.
-        pace: how fast it is played, as a share of what the robots can.
     """
 
-    robot: int
-    formations: Array
-    pace: float = 1.0
+    robot: int  # the one it is about
+    formations: Array  # (k, N, 3), m
+    pace: float = 1.0  # how fast it is played, as a share of what the robots can
 
 
 def move(world: World, robot: int, *changes: dict[int, Array]) -> Script:
@@ -106,14 +99,10 @@ class Player:
 
 _ANGLES = tuple(math.radians(a) for a in (0, 30, -30, 60, -60, 90, -90, 135, -135))
 _DETOURS = tuple(math.radians(a) for a in (30, -30, 60, -60))
-_BEYOND = 1.5
-"""How much farther than a segment is long its ends are driven apart."""
-_BEHIND = 0.5
-"""How far behind an obstacle or a bound a robot is driven, in cells."""
-_SLACK = 0.95
-"""Share of a segment that neighbours may be apart where some follow another."""
-_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)
-"""Where along a segment it is run over, the middle first."""
+_BEYOND = 1.5  # how much farther than a segment is long its ends are driven apart
+_BEHIND = 0.5  # how far behind an obstacle or a bound a robot is driven, in cells
+_SLACK = 0.95  # share of a segment that neighbours may be apart where some follow another
+_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)  # where along a segment it is run over, the middle first
 
 
 def list_stretches(driver: Driver) -> list[Script]:

@@ -1,7 +1,5 @@
 """A hose in MuJoCo's own pictures, coloured by tension: in a viewer, or an episode as a film."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -73,11 +71,7 @@ def write_mp4(
 
 
 def render_frames(
-    episode: WorldEpisode,
-    scene: Scene,
-    size: tuple[int, int],
-    fps: int,
-    camera: str | None = None,
+    episode: WorldEpisode, scene: Scene, size: tuple[int, int], fps: int, camera: str | None = None
 ) -> Iterator[NDArray[np.uint8]]:
     """Yields pictures (height, width, 3) of an episode, evenly spaced in time."""
     times = episode.samples.times

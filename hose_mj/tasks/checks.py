@@ -1,11 +1,8 @@
 """Checks of task options: each raises one `InputError` that names option, value and valid set."""
 
-from __future__ import annotations
-
-import math
 from collections.abc import Collection
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, is_finite
 
 
 def check_integer(name: str, value: object, low: int, high: int) -> None:
@@ -18,13 +15,13 @@ def check_integer(name: str, value: object, low: int, high: int) -> None:
 def check_finite(name: str, value: object) -> None:
     """Raises unless the value is a finite number."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value):  # type: ignore[arg-type]
+    if not is_number or not is_finite(value):
         raise InputError(name, value, "a finite number")
 
 
 def check_choice(name: str, value: object, choices: Collection[object]) -> None:
     """Raises unless the value is one of the choices."""
-    if not any(value == choice and type(value) is type(choice) for choice in choices):
+    if not any(type(value) is type(choice) and value == choice for choice in choices):
         raise InputError(name, value, "one of " + ", ".join(map(repr, choices)))
 
 

@@ -1,7 +1,5 @@
 """Small tasks written out state by state and solved by value iteration: the truth for tests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
@@ -14,25 +12,17 @@ from hose_mj.tasks import kernels
 from hose_mj.tasks.kernels import NOT_FOUND, STEPS, TOO_MANY, TURN, Floats, Integers
 from hose_mj.tasks.task import Task
 
-OVER = -1
-"""The successor of a move that ends the episode."""
+OVER = -1  # the successor of a move that ends the episode
 
 
 @dataclass(frozen=True)
 class Model:
-    """A task written out. The step limit plays no part in it.
+    """A task written out. The step limit plays no part in it."""
 
-    Attributes:
-        states: the states that can be reached, step count 0 (n_states, state_size).
-        successors: index of the next state, or `OVER` (n_states, n_actions).
-        events: events of each move (n_states, n_actions).
-        rewards: what each agent gets, all signals added up (n_states, n_actions, n_agents).
-    """
-
-    states: Integers
-    successors: Integers
-    events: Integers
-    rewards: Floats
+    states: Integers  # the states that can be reached, step count 0 (n_states, state_size)
+    successors: Integers  # index of the next state, or `OVER` (n_states, n_actions)
+    events: Integers  # events of each move (n_states, n_actions)
+    rewards: Floats  # what each agent gets, all signals added up (n_states, n_actions, n_agents)
 
     @property
     def turns(self) -> Integers:
@@ -135,21 +125,8 @@ def _enumerate(
     )
 
 
-def discount_cycles(model: Model, discount: float) -> Floats:
-    """Returns the discount of each state's moves when only a full cycle of turns is discounted.
-
-    It is 1 within a cycle and `discount` for the move that hands the turn back to agent 0 (the
-    cycle's rewards are then summed without discount, as Algorithm 4.1 does for agent 0).
-    """
-    last = model.states[:, TURN].max()
-    return np.where(model.turns == last, discount, 1.0)
-
-
 def solve(
-    model: Model,
-    rewards: npt.ArrayLike,
-    discount: npt.ArrayLike,
-    tolerance: float = 1e-12,
+    model: Model, rewards: npt.ArrayLike, discount: npt.ArrayLike, tolerance: float = 1e-12
 ) -> Floats:
     """Returns the optimal state-action values (n_states, n_actions) by value iteration.
 

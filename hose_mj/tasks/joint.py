@@ -4,8 +4,6 @@ The actions of a joint move are packed into one integer, three bits for each rob
 need no work array. A robot whose move is cancelled has the action CANCELLED, which moves nothing.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from hose_mj.jit import jitable

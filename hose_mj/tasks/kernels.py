@@ -20,8 +20,6 @@ Every record has these fields:
 - `reward_table`: reward of each set of events, by signal (2^n_events, n_signals).
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol, cast
@@ -34,8 +32,7 @@ from hose_mj.jit import compiled, jitable
 from hose_mj.tasks.stream import Stream, draw_below
 
 TURN, STEPS = 0, 1
-HEADER = 2
-"""Where a task's own part of the state begins."""
+HEADER = 2  # where a task's own part of the state begins
 
 Integers = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -213,12 +210,7 @@ def project(projection: Projection, values: Integers) -> int:
 
 @compiled
 def run_random(
-    record: Any,
-    state: Integers,
-    stream: Stream,
-    n_moves: int,
-    values: Integers,
-    counts: Integers,
+    record: Any, state: Integers, stream: Stream, n_moves: int, values: Integers, counts: Integers
 ) -> None:
     """Plays random moves, agents in turn, observing before each one; for timing and tests.
 

@@ -19,11 +19,12 @@ import dataclasses
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING, Any, cast
 
 from hose_mj.errors import InputError, check_choice
-from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.plugins import find_plugins, load_plugin, load_plugins
 
 if TYPE_CHECKING:
     from hose_mj.tasks.task import Task
@@ -31,29 +32,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TaskEntry:
-    """Where a task is and what it is.
+    """Where a task is and what it is."""
 
-    Attributes:
-        module: module with the settings class and the factory, which takes the settings.
-        settings: name of the settings class.
-        factory: name of the factory.
-        description: one line for listings.
-        presets: settings that make the id; they cannot be given.
-        defaults: settings that differ from the class's defaults; they can.
-        is_alone: whether the task has one agent whatever its settings.
-    """
-
-    module: str
-    settings: str
-    factory: str
-    description: str
+    module: str  # module with the settings class and the factory, which takes the settings
+    settings: str  # name of the settings class
+    factory: str  # name of the factory
+    description: str  # one line for listings
+    # Settings that make the id; they cannot be given.
     presets: Mapping[str, Any] = field(default_factory=dict)
+    # Settings that differ from the class's defaults; they can.
     defaults: Mapping[str, Any] = field(default_factory=dict)
-    is_alone: bool = False
+    is_alone: bool = False  # whether the task has one agent whatever its settings
 
 
 _LINE = ("hose_mj.tasks.line.settings", "LineSettings", "make_line")
 _TAXI = ("hose_mj.tasks.taxi.settings", "TaxiSettings", "make_taxi")
+_TINY = "hose_mj.tasks.tiny.settings"
 TASKS: dict[str, TaskEntry] = {
     "line": TaskEntry(
         *_LINE,
@@ -87,9 +81,7 @@ TASKS: dict[str, TaskEntry] = {
         },
     ),
     "taxi": TaskEntry(
-        *_TAXI,
-        "two taxis and two passengers on Dietterich's map (B.3)",
-        {"single_agent": False},
+        *_TAXI, "two taxis and two passengers on Dietterich's map (B.3)", {"single_agent": False}
     ),
     "taxi-single-agent": TaskEntry(
         *_TAXI,
@@ -98,16 +90,11 @@ TASKS: dict[str, TaskEntry] = {
         is_alone=True,
     ),
     "corridor": TaskEntry(
-        "hose_mj.tasks.tiny.settings",
-        "CorridorSettings",
-        "make_corridor",
+        *(_TINY, "CorridorSettings", "make_corridor"),
         "two robots in a corridor of three cells (Example 1, section 6.4)",
     ),
     "maze": TaskEntry(
-        "hose_mj.tasks.tiny.settings",
-        "MazeSettings",
-        "make_maze",
-        "one robot among the walls of Table 5.1",
+        *(_TINY, "MazeSettings", "make_maze", "one robot among the walls of Table 5.1"),
         is_alone=True,
     ),
 }
@@ -129,10 +116,9 @@ def list_tasks() -> dict[str, TaskEntry]:
     """Returns all tasks by id, those of other packages last.
 
     Raises:
-        InputError: an id that is taken, or a package whose entry cannot be imported.
+        InputError: an id that is taken.
     """
-    plugins = {id: load_plugin(entry, TaskEntry) for id, entry in find_task_plugins().items()}
-    return {**TASKS, **plugins}
+    return {**TASKS, **load_plugins(find_task_plugins(), partial(load_plugin, kind=TaskEntry))}
 
 
 def find_task(id: str) -> TaskEntry:

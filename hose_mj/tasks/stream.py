@@ -4,8 +4,6 @@ A stream is a uint64 array of length 1, seeded from a numpy Generator; each draw
 place. Generator of Steele, Lea and Flood (2014), bounded integers without bias after Lemire (2019).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """`Task`: a grid or physics task as data, with the record that selects its compiled functions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -22,31 +20,21 @@ class Task:
     """A task: names for everything, and the record of its rules.
 
     The rules themselves are the functions of `hose_mj.tasks.kernels`, called with `kernel`.
-
-    Attributes:
-        id: its name in the registry.
-        agents: names of the agents, in the order of their turns.
-        action_names: actions of each agent, by number.
-        variables: state variables, in the order in which `kernels.observe` writes them.
-        rewards: names of the reward signals, in the order of `kernels.compute_rewards`.
-        events: names of the events; event k is bit k of an event set.
-        schedule: "turns" (the agents move one after the other, or jointly) or "single".
-        settings: the frozen dataclass of all options that the task was made with.
-        kernel: the record whose type selects the code; its fields are listed in `kernels`.
-        layout: the parts of the state after its header, by name.
-        state_size: length of the state.
     """
 
-    id: str
-    agents: tuple[str, ...]
-    action_names: tuple[str, ...]
+    id: str  # its name in the registry
+    agents: tuple[str, ...]  # names of the agents, in the order of their turns
+    action_names: tuple[str, ...]  # actions of each agent, by number
+    # State variables, in the order in which `kernels.observe` writes them.
     variables: tuple[Variable, ...]
+    # Names of the reward signals, in the order of `kernels.compute_rewards`.
     rewards: tuple[str, ...]
-    events: tuple[str, ...]
-    settings: Any
-    kernel: Any
-    layout: Mapping[str, slice]
-    state_size: int
+    events: tuple[str, ...]  # names of the events; event k is bit k of an event set
+    settings: Any  # the frozen dataclass of all options that the task was made with
+    kernel: Any  # the record whose type selects the code; its fields are listed in `kernels`
+    layout: Mapping[str, slice]  # the parts of the state after its header, by name
+    state_size: int  # length of the state
+    # "turns" (the agents move one after the other, or jointly) or "single".
     schedule: Schedule = "turns"
 
     @property

@@ -1,7 +1,5 @@
 """Named state variables, and projections onto some of them: what a module of a learner sees."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,15 +14,12 @@ LARGEST_SIZE = 2**62
 
 @dataclass(frozen=True)
 class Variable:
-    """One state variable, whose values are 0 .. cardinality - 1; their meaning is in words.
-
-    `per_agent` says whether each agent sees a value of its own.
-    """
+    """One state variable, whose values are 0 .. cardinality - 1; their meaning is in words."""
 
     name: str
     cardinality: int
     meaning: str
-    per_agent: bool = False
+    per_agent: bool = False  # whether each agent sees a value of its own
 
 
 def make_projection(variables: Sequence[Variable], names: Iterable[str]) -> Projection:

@@ -1,7 +1,5 @@
 """What a case is, the hoses that cases use, how they are laid and read."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -34,27 +32,20 @@ ROD = replace(STOUT, axial_stiffness=4e5 * BENDING_STIFFNESS)
 """The hose of the motions: EA L^2 / EI = 4e5."""
 CHAIN = replace(STOUT, axial_stiffness=1e5, bending_stiffness=1e-7, torsional_stiffness=1e-2)
 """A chain: EI / (w L^3) = 1e-7."""
-STIFFENING = 1e3
-"""EA of the reference for inextensible models, over that of the case."""
+STIFFENING = 1e3  # EA of the reference for inextensible models, over that of the case
 GRAVITY = 9.81
-DOWN = (0.0, 0.0, -GRAVITY)
-"""The gravity of most motions (m/s^2)."""
+DOWN = (0.0, 0.0, -GRAVITY)  # the gravity of most motions (m/s^2)
 WEIGHT = LINEAR_DENSITY * GRAVITY * LENGTH
 UNIT_FREQUENCY = math.sqrt(BENDING_STIFFNESS / (LINEAR_DENSITY * LENGTH**4))
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a dynamic case.
+    """The motion of a dynamic case."""
 
-    Attributes:
-        duration: s.
-        n_samples: instants, evenly spaced and the last at the end, at which models are compared.
-        drive: moves the holds for the end of a step at time t; None where nothing is moved.
-    """
-
-    duration: float
-    n_samples: int
+    duration: float  # s
+    n_samples: int  # instants, evenly spaced and the last at the end, at which models are compared
+    # Moves the holds for the end of a step at time t; None where nothing is moved.
     drive: Callable[[HoseModel, list[Hold], float], None] | None = None
 
     @property
@@ -65,69 +56,51 @@ class Motion:
 
 @dataclass(frozen=True)
 class Reference:
-    """The truth of a motion: probe values (k, q), and how far two resolutions of it still differ.
+    """The truth of a motion."""
 
-    `uncertainty` is a fraction of L.
-    """
-
-    values: Array
-    uncertainty: float
+    values: Array  # of the probe (k, q)
+    uncertainty: float  # how far two resolutions of it still differ, as a fraction of L
 
 
 @dataclass(frozen=True)
 class Case:
-    """One case.
+    """One case."""
 
-    Attributes:
-        id: stable; a parameter stands behind the family's name and a dash.
-        title: one line.
-        about: what is done, what is compared, against what.
-        spec: the hose.
-        lay: puts a fresh hose into its initial state and returns its holds.
-        probe: what is compared, (q,); for static cases it finds the equilibrium itself.
-        family: the id without its parameter; by default the id.
-        gravity: (3,) m/s^2.
-        truth: closed form of the probe, (q,); None where the reference is the converged limit.
-        scale: what errors are a fraction of: None for the reference's own value, else a length (m).
-        motion: None for static cases.
-        clamped: True where one end is clamped, so that a chain's clamp can be corrected.
-        planar: True where the hose stays in a plane parallel to x and z.
-        models: the models that the case is run with.
-        steps: time steps of GEDS (s), coarse to fine; dynamic cases only.
-        resolutions: by model, in place of the grid's; static cases only.
-        promised: largest error of GEDS by control points, which `compare` checks; by default that
-            of the finest.
-        obstacles: what the hose may touch.
-        contact_law: of GEDS; None for its defaults.
-        reference: computes the motion's truth where that is not the converged limit of GEDS.
-        uncertainty: how far two resolutions of the reference may differ, of L.
-        promise: error that GEDS keeps with its finest setting; motions only, None for no promise.
-        has_ratios: False where models do not converge to the same motion, so that costs at equal
-            error mean nothing.
-    """
-
-    id: str
-    title: str
-    about: str
-    spec: HoseSpec
+    id: str  # stable; a parameter stands behind the family's name and a dash
+    title: str  # one line
+    about: str  # what is done, what is compared, against what
+    spec: HoseSpec  # the hose
+    # Puts a fresh hose into its initial state and returns its holds.
     lay: Callable[[HoseModel], list[Hold]]
+    # What is compared, (q,); for static cases it finds the equilibrium itself.
     probe: Callable[[HoseModel], Array]
-    family: str = ""
-    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    family: str = ""  # the id without its parameter; by default the id
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) m/s^2
+    # Closed form of the probe, (q,); None where the reference is the converged limit.
     truth: Callable[[], Array] | None = None
+    # What errors are a fraction of: None for the reference's own value, else a length (m).
     scale: float | None = None
-    motion: Motion | None = None
-    clamped: bool = False
-    planar: bool = True
+    motion: Motion | None = None  # None for static cases
+    clamped: bool = False  # True where one end is clamped, so that a chain's clamp can be corrected
+    planar: bool = True  # True where the hose stays in a plane parallel to x and z
+    # The models that the case is run with.
     models: tuple[str, ...] = ("geds", "cable", "flex", "hinge-chain")
+    # Time steps of GEDS (s), coarse to fine; dynamic cases only.
     steps: tuple[float, ...] = tuple(0.02 / k for k in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32))
+    # By model, in place of the grid's; static cases only.
     resolutions: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    # Largest error of GEDS by control points, which `compare` checks; by default that of the
+    # finest.
     promised: Mapping[int, float] = field(default_factory=dict)
-    obstacles: tuple[Obstacle, ...] = ()
-    contact_law: ContactLaw | None = None
+    obstacles: tuple[Obstacle, ...] = ()  # what the hose may touch
+    contact_law: ContactLaw | None = None  # of GEDS; None for its defaults
+    # Computes the motion's truth where that is not the converged limit of GEDS.
     reference: Callable[[], Reference] | None = None
-    uncertainty: float = 1e-4
+    uncertainty: float = 1e-4  # how far two resolutions of the reference may differ, of L
+    # Error that GEDS keeps with its finest setting; motions only, None for no promise.
     promise: float | None = None
+    # False where models do not converge to the same motion, so that costs at equal error mean
+    # nothing.
     has_ratios: bool = True
 
     def __post_init__(self) -> None:
@@ -208,7 +181,4 @@ def lay_between(hose: HoseModel, span: float) -> list[Hold]:
     """Lets a hose sag between two attachments of one height."""
     curve = _sag(span / LENGTH)
     hose.reset(lambda s: LENGTH * curve(s / LENGTH))
-    return [
-        hose.attach(0.0, (0.0, 0.0, 0.0)),
-        hose.attach(hose.spec.length, (span, 0.0, 0.0)),
-    ]
+    return [hose.attach(0.0, (0.0, 0.0, 0.0)), hose.attach(hose.spec.length, (span, 0.0, 0.0))]

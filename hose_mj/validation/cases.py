@@ -5,14 +5,13 @@ A case is `static` (an equilibrium, frequencies or a critical load, compared wit
 from another package, by an entry point in the group `hose_mj.cases`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache
+from importlib.metadata import EntryPoint
 
 from hose_mj.errors import InputError
-from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.plugins import find_plugins, load_plugin, load_plugins
 from hose_mj.validation import motions, statics
 from hose_mj.validation.case import Case
 
@@ -46,22 +45,23 @@ def list_plugin_cases() -> tuple[Case, ...]:
 
     An entry point is a `Case`, or a callable without arguments that returns some.
 
-    Raises:
-        InputError: an entry point that cannot be imported or is neither, or an id that is taken.
+    One that cannot be imported or is neither, or whose ids are taken, is left out with a warning.
     """
     cases: list[Case] = []
-    for name, entry in find_plugins("hose_mj.cases").items():
+
+    def add(entry: EntryPoint) -> None:
         loaded = load_plugin(entry, (Case, Callable))  # type: ignore[arg-type]
         added = [loaded] if isinstance(loaded, Case) else list(loaded())
         for case in added:
             if not isinstance(case, Case):
                 valid = "a Case, or a callable that returns a list of Case"
-                raise InputError(f"entry point {name!r} in hose_mj.cases", case, valid)
+                raise InputError(f"entry point {entry.name!r} in hose_mj.cases", case, valid)
             if any(case.id == other.id for other in (*CASES, *cases)):
-                raise InputError(
-                    f"id of a case of entry point {name!r}", case.id, "an id of its own"
-                )
-            cases.append(case)
+                what = f"id of a case of entry point {entry.name!r}"
+                raise InputError(what, case.id, "an id of its own")
+        cases.extend(added)
+
+    load_plugins(find_plugins("hose_mj.cases"), add)
     return tuple(cases)
 
 
@@ -69,9 +69,7 @@ def find_cases(ids: tuple[str, ...]) -> tuple[Case, ...]:
     """Returns the cases of these ids, in the order of `CASES`; a family's name selects all of it.
 
     Without ids all of `CASES`; those of other packages (`list_plugin_cases`) run when asked for.
-
-    Raises:
-        InputError: an id that is neither a case nor a family.
+    `InputError` is raised for an id that is neither a case nor a family.
     """
     if not ids:
         return CASES

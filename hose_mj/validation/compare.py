@@ -1,7 +1,5 @@
 """The comparison: cases by models by settings, then equal-error ratios and checks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -27,45 +25,32 @@ INEXTENSIBLE = tuple(model for model, entry in MODELS.items() if not entry.stret
 
 @dataclass(frozen=True)
 class Ratio:
-    """At equal error, what one model costs over another: each at its cheapest setting of the grid.
+    """What one model costs over another at equal error, each at its cheapest setting."""
 
-    Attributes:
-        case: its id.
-        at_error: both errors are at most this.
-        model, against: the two models.
-        planar: whether `model` ran in a plane (GEDS has a path of its own for it) or in space.
-        wall_ratio: wall time of `against` over that of `model`.
-        model_setting, against_setting: labels of the settings.
-    """
-
-    case: str
-    at_error: float
+    case: str  # its id
+    at_error: float  # both errors are at most this
+    # model, against: the two models.
     model: str
     against: str
-    planar: bool
-    wall_ratio: float
+    planar: bool  # whether `model` ran in a plane (GEDS has a path of its own for it) or in space
+    wall_ratio: float  # wall time of `against` over that of `model`
+    # model_setting, against_setting: labels of the settings.
     model_setting: str
     against_setting: str
 
 
 @dataclass
 class CaseResult:
-    """All that was run in one case.
+    """All that was run in one case."""
 
-    Attributes:
-        case: the case.
-        outcomes: scored runs.
-        skipped: settings left out, with reasons.
-        stretchable, inextensible: converged references; None in statics.
-        limit_gap: distance of MuJoCo's own Richardson limit from the inextensible reference, as a
-            fraction of L; None where the grid does not reach far enough to extrapolate.
-    """
-
-    case: Case
-    outcomes: list[RunResult] = field(default_factory=list)
-    skipped: list[Skipped] = field(default_factory=list)
+    case: Case  # the case
+    outcomes: list[RunResult] = field(default_factory=list)  # scored runs
+    skipped: list[Skipped] = field(default_factory=list)  # settings left out, with reasons
+    # stretchable, inextensible: converged references; None in statics.
     stretchable: Reference | None = None
     inextensible: Reference | None = None
+    # Distance of MuJoCo's own Richardson limit from the inextensible reference, as a fraction of L;
+    # None where the grid does not reach far enough to extrapolate.
     limit_gap: float | None = None
 
 

@@ -1,7 +1,5 @@
 """Small motions of any hose model: frequencies and critical loads from `HoseModel.linearize`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,8 +8,7 @@ from scipy.optimize import brentq
 
 from hose_mj.hoses.protocol import Array, Linearization
 
-_SAME = 1e-4
-"""Relative distance below which two frequencies count as one mode seen in two planes."""
+_SAME = 1e-4  # relative distance below which two frequencies count as one mode seen in two planes
 
 
 def compute_frequencies(small: Linearization, n_modes: int, above: float) -> Array:
@@ -90,9 +87,7 @@ def turn_about_x(small: Linearization, angle: float) -> Linearization:
     turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
     whole = np.kron(np.eye(len(small.mass) // 3), turn)
     return Linearization(
-        whole @ small.mass @ whole.T,
-        whole @ small.stiffness @ whole.T,
-        small.constraints @ whole.T,
+        whole @ small.mass @ whole.T, whole @ small.stiffness @ whole.T, small.constraints @ whole.T
     )
 
 

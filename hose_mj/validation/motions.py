@@ -1,7 +1,5 @@
 """The dynamic cases, compared with their converged limit, and those with contact."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache, partial
@@ -35,6 +33,7 @@ ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 """Turns a cylinder's axis to y, across the plane in which hoses are laid."""
 
 _MOTION = partial(make_case, gravity=DOWN, scale=LENGTH)
+_FREE = Motion(1.0, 50)
 
 
 def _ease(time: float, ramp: float) -> float:
@@ -45,12 +44,7 @@ def _ease(time: float, ramp: float) -> float:
 def make_released_rod() -> Case:
     """A horizontal cantilever let go."""
     return _MOTION(
-        "released-rod",
-        spec=ROD,
-        lay=lay_cantilever,
-        probe=read_tip,
-        motion=Motion(1.0, 50),
-        clamped=True,
+        "released-rod", spec=ROD, lay=lay_cantilever, probe=read_tip, motion=_FREE, clamped=True
     )
 
 
@@ -69,14 +63,8 @@ def make_free_flight() -> Case:
         hose.reset([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]], speed)
         return []
 
-    return make_case(
-        "free-flight",
-        spec=ROD,
-        lay=lay,
-        probe=read_places((0.0, 0.5, 1.0)),
-        scale=LENGTH,
-        motion=Motion(1.0, 50),
-    )
+    probe = read_places((0.0, 0.5, 1.0))
+    return make_case("free-flight", spec=ROD, lay=lay, probe=probe, scale=LENGTH, motion=_FREE)
 
 
 def make_taut_pull() -> Case:
@@ -215,14 +203,7 @@ def compute_tow_place(fraction: Array) -> Array:
     return np.asarray(_make_eight()(fraction))
 
 
-def tow_chain(
-    spec: HoseSpec,
-    friction: float,
-    start: Array,
-    path: Array,
-    delta: float,
-    gravity: float = GRAVITY,
-) -> Array:
+def tow_chain(spec: HoseSpec, friction: float, start: Array, path: Array, delta: float) -> Array:
     """Tows a chain by its last node.
 
     Args:
@@ -231,7 +212,6 @@ def tow_chain(
         start: nodes (N + 1, 2) of the chain at rest, evenly spaced along it, m.
         path: places of the last node, one an increment, (k, 2), m.
         delta: slip below which friction is smoothed (m), well below an increment.
-        gravity: m/s^2.
 
     Returns:
         nodes after each increment, (k, N + 1, 2), m.
@@ -241,7 +221,7 @@ def tow_chain(
     """
     n = len(start)
     h = spec.length / (n - 1)
-    drag = friction * spec.linear_density * gravity
+    drag = friction * spec.linear_density * GRAVITY
     chain = Chain(h, spec.axial_stiffness, spec.bending_stiffness, drag, delta, 1e-3 * delta)
     x = np.array(start, dtype=np.float64).ravel()
     padded = 2 * n + WIDTH
@@ -317,7 +297,7 @@ def make_obstacle_drop() -> Case:
         ),
         lay=lay_cantilever,
         probe=read_places((0.5, 0.75, 1.0)),
-        motion=Motion(1.0, 50),
+        motion=_FREE,
         clamped=True,
         models=("geds", "cable"),
         obstacles=(bar,),

@@ -4,8 +4,6 @@ Each function returns checks; together they are the part of `hose-mj compare` th
 One more measures the softness that is left in the edges of MuJoCo's flex rod.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -24,18 +22,15 @@ from hose_mj.validation.modes import compute_frequencies
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import Setting
 
-Curves = dict[str, tuple[list[float], list[float]]]
-"""Label -> (x, error) of a convergence plot."""
+Curves = dict[str, tuple[list[float], list[float]]]  # label -> (x, error) of a convergence plot
 Kind = tuple[str | None, int]
 """A plane or a form of twist, and control points: what steps are timed by."""
-FORMS = ("scalar", "theta")
-"""The two ways in which GEDS carries twist."""
+FORMS = ("scalar", "theta")  # the two ways in which GEDS carries twist
 FLEX_CASE = "released-rod"
 FLEX_SEGMENTS = 20
 FLEX_STEPS = (0.004, 0.002, 0.001)
 """Time steps (s) of the flex rod; its default edges have a time constant of two steps."""
-_SETTLING = 20
-"""Turns after which a precessing rod has settled."""
+_SETTLING = 20  # turns after which a precessing rod has settled
 
 
 def measure_order(sizes: list[float], errors: list[float]) -> float:
@@ -262,7 +257,7 @@ def _compute_spin(tangent: Array, director: Array, angle: float) -> tuple[Array,
     return ahead, wanted, spin
 
 
-def precess(form: str, n_turns: int, steps_a_turn: int = 36) -> Iterator[GedsHose]:
+def precess(form: str, n_turns: int) -> Iterator[GedsHose]:
     """Turns a bent, twisted rod about the axis of its first clamp as if it were rigid.
 
     Yields the hose at equilibrium before it begins, then after every turn.
@@ -280,9 +275,9 @@ def precess(form: str, n_turns: int, steps_a_turn: int = 36) -> Iterator[GedsHos
     yield hose
     place, tangent = hose.position(LENGTH)[0], hose.tangent(LENGTH)[0]
     director = np.cross(tangent, [0.0, 0.0, 1.0])
-    angle = 2.0 * math.pi / steps_a_turn
+    angle = 2.0 * math.pi / 36
     for _ in range(n_turns):
-        for _ in range(steps_a_turn):
+        for _ in range(36):
             place = _turn_about_x(place, angle)
             tangent, director, spin = _compute_spin(tangent, director, angle)
             hose.move(holds[0], spin=angle)

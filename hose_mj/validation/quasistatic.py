@@ -11,8 +11,6 @@ rate-independent plasticity; Mielke and Theil 2004). No spline, no time, no velo
 nothing with the hose models but the Cholesky factorization. delta is a small part of the increment.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -22,29 +20,20 @@ from hose_mj.hoses.protocol import Array
 from hose_mj.jit import compiled, kernel
 
 _AXES = (0.0, 0.0)
-WIDTH = 8
-"""Columns of the band that `factorize` expects; the chain fills six."""
-_ITERATIONS = 200
-"""Newton steps after which an increment that has not converged is given up."""
+WIDTH = 8  # columns of the band that `factorize` expects; the chain fills six
+_ITERATIONS = 200  # Newton steps after which an increment that has not converged is given up
 
 
 class Chain(NamedTuple):
-    """A chain on a rough floor.
+    """A chain on a rough floor."""
 
-    Attributes:
-        h: rest length of a link (m).
-        stretch, bend: EA (N) and EI (N m^2).
-        drag: friction per length (N/m).
-        delta: slip below which friction is smoothed (m).
-        tolerance: largest change of a coordinate in a converged Newton step (m).
-    """
-
-    h: float
+    h: float  # rest length of a link (m)
+    # stretch, bend: EA (N) and EI (N m^2).
     stretch: float
     bend: float
-    drag: float
-    delta: float
-    tolerance: float
+    drag: float  # friction per length (N/m)
+    delta: float  # slip below which friction is smoothed (m)
+    tolerance: float  # largest change of a coordinate in a converged Newton step (m)
 
 
 @kernel

@@ -1,7 +1,5 @@
 """Random states and loads, wilder than any use: what the solver does with them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,23 +11,16 @@ from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 
-N_STEPS = 3
-"""Steps taken from each state."""
+N_STEPS = 3  # steps taken from each state
 
 
 @dataclass
 class Tally:
-    """Counts of the ways in which random states ended.
+    """Counts of the ways in which random states ended."""
 
-    Attributes:
-        not_finite: a position or velocity that is not finite.
-        verdicts: a StepError.
-        touched: a StepError after which the state was not the one before the failing step.
-    """
-
-    not_finite: int = 0
-    verdicts: int = 0
-    touched: int = 0
+    not_finite: int = 0  # a position or velocity that is not finite
+    verdicts: int = 0  # a StepError
+    touched: int = 0  # a StepError after which the state was not the one before the failing step
 
 
 def make_random_hose(rng: np.random.Generator) -> GedsHose:

@@ -5,8 +5,6 @@ unless its docstring says otherwise. The elastica is solved as an initial value 
 shooting angle to 1e-12; it is exact for an inextensible, unshearable rod.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Runs cases: statics in one go, motions down ladders of time steps, timed in rounds."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence
@@ -12,56 +10,35 @@ import numpy as np
 from hose_mj.errors import StepError
 from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.validation.case import STIFFENING, Case, Motion, Reference
-from hose_mj.validation.settings import (
-    MOST_UNSTABLE,
-    STAGNATION,
-    Grid,
-    Setting,
-    list_static,
-)
+from hose_mj.validation.settings import MOST_UNSTABLE, STAGNATION, Grid, Setting, list_static
 
 LOST = 0.5
 """A chain's error above this fraction counts as unstable even where no number overflowed, but in
 cases where models are expected to differ."""
-EQUAL_ERRORS = (0.01, 0.001)
-"""Errors at which costs are compared."""
-N_CONTENDERS = 2
-"""Runs of each model that are timed again at each of these errors."""
-REFERENCE_POINTS = 48
-"""Control points of the references of the cases."""
-BUDGET_SPENT = "the budget was spent"
-"""The reason of a run that did not start any more."""
+EQUAL_ERRORS = (0.01, 0.001)  # errors at which costs are compared
+N_CONTENDERS = 2  # runs of each model that are timed again at each of these errors
+REFERENCE_POINTS = 48  # control points of the references of the cases
+BUDGET_SPENT = "the budget was spent"  # the reason of a run that did not start any more
 N_DRAWN, N_DRAWN_IN_SPACE = 41, 601
 """Points along the hose that are kept for pictures; a coil needs more."""
 
 
 @dataclass
 class RunResult:
-    """The result of one setting in one case.
+    """The result of one setting in one case."""
 
-    Attributes:
-        case: its id.
-        setting: how it was run.
-        error: largest error as a fraction (of the reference value or of the hose's length).
-        reference: "closed form" or "converged".
-        wall_s: least wall time of the whole run, moving of holds included, reading excluded (s).
-        sim_s: simulated time (s); None in statics.
-        fallbacks: of the solver.
-        times: sampled instants (k,).
-        points: centre lines at those instants, (k, N_DRAWN or N_DRAWN_IN_SPACE, 3).
-        values: the probe at those instants, (k, q).
-    """
-
-    case: str
-    setting: Setting
-    error: float
-    reference: str
+    case: str  # its id
+    setting: Setting  # how it was run
+    error: float  # largest error as a fraction (of the reference value or of the hose's length)
+    reference: str  # "closed form" or "converged"
+    # Least wall time of the whole run, moving of holds included, reading excluded (s).
     wall_s: float
-    sim_s: float | None
-    fallbacks: int
-    times: Array = field(repr=False)
+    sim_s: float | None  # simulated time (s); None in statics
+    fallbacks: int  # of the solver
+    times: Array = field(repr=False)  # sampled instants (k,)
+    # Centre lines at those instants, (k, N_DRAWN or N_DRAWN_IN_SPACE, 3).
     points: Array = field(repr=False)
-    values: Array = field(repr=False)
+    values: Array = field(repr=False)  # the probe at those instants, (k, q)
 
     @property
     def wall_s_per_sim_s(self) -> float | None:
@@ -198,11 +175,7 @@ def stiffen(case: Case) -> Case:
 
 
 def run_ladder(
-    case: Case,
-    ladder: list[Setting],
-    reference: Reference,
-    grid: Grid,
-    until: float = math.inf,
+    case: Case, ladder: list[Setting], reference: Reference, grid: Grid, until: float = math.inf
 ) -> tuple[list[RunResult], list[Skipped]]:
     """Runs one model and resolution down its time steps, from the largest stable one on.
 

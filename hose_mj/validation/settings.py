@@ -1,7 +1,5 @@
 """The grid of settings on which `hose-mj compare` looks for each model's cheapest."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,10 +14,8 @@ STEP_UNIT = 0.02
 """Time steps are this over a whole number, so that they divide the pauses between samples (s)."""
 LARGEST_STEP = STEP_UNIT / 2
 SMALLEST_STEP = 1e-6
-RAW_CLAMPS = (10, 20, 40, 80)
-"""Segments with which MuJoCo's clamp is also run as documented."""
-MOST_UNSTABLE = 10
-"""A chain that is unstable at the first so many time steps is given up."""
+RAW_CLAMPS = (10, 20, 40, 80)  # segments with which MuJoCo's clamp is also run as documented
+MOST_UNSTABLE = 10  # a chain that is unstable at the first so many time steps is given up
 STAGNATION = 0.15
 """A chain's time step is halved, from the largest stable one on, until a halving takes less than
 this fraction off its error."""
@@ -32,21 +28,13 @@ def has_cable() -> bool:
 
 @dataclass(frozen=True)
 class Setting:
-    """The numbers and the scheme with which a model is run.
+    """The numbers and the scheme with which a model is run."""
 
-    Attributes:
-        model: id in `hoses.registry.MODELS`.
-        scheme: integrator, and ", planar" behind it for a GEDS hose that moves in a plane.
-        resolution: control points or segments.
-        clamp_corrected: None where there is nothing to correct.
-        timestep: s; None in statics.
-    """
-
-    model: str
-    scheme: str
-    resolution: int
-    clamp_corrected: bool | None = None
-    timestep: float | None = None
+    model: str  # id in `hoses.registry.MODELS`
+    scheme: str  # integrator, and ", planar" behind it for a GEDS hose that moves in a plane
+    resolution: int  # control points or segments
+    clamp_corrected: bool | None = None  # None where there is nothing to correct
+    timestep: float | None = None  # s; None in statics
 
     @property
     def planar(self) -> bool:
@@ -91,30 +79,18 @@ Less does not allow it larger steps: from 20 segments on, bending limits them.
 
 @dataclass(frozen=True)
 class Grid:
-    """What is run.
+    """What is run."""
 
-    Attributes:
-        static: resolutions of statics and frequencies, by model.
-        dynamic: resolutions of motions, by model.
-        schemes: integrators of motions, by model.
-        smallest_geds_step: GEDS's time steps end here (s).
-        longest_ladder: at most so many time steps of a chain's resolution are scored.
-        longest_flex_ladder: the same for the flex, which is stable from the largest step on.
-        longest_run: a run that would take longer is left out (s).
-        longest_timed_run: a run that took longer is not timed again (s).
-        rounds: how often a short run is timed, all models in turn; the least counts.
-        reference_steps: between two samples of a reference, free and damped, the finer of two.
-    """
-
-    static: dict[str, tuple[int, ...]]
-    dynamic: dict[str, tuple[int, ...]]
-    schemes: dict[str, tuple[str, ...]]
-    smallest_geds_step: float
-    longest_ladder: int
-    longest_flex_ladder: int
-    longest_run: float
-    longest_timed_run: float
-    rounds: int
+    static: dict[str, tuple[int, ...]]  # resolutions of statics and frequencies, by model
+    dynamic: dict[str, tuple[int, ...]]  # resolutions of motions, by model
+    schemes: dict[str, tuple[str, ...]]  # integrators of motions, by model
+    smallest_geds_step: float  # GEDS's time steps end here (s)
+    longest_ladder: int  # at most so many time steps of a chain's resolution are scored
+    longest_flex_ladder: int  # the same for the flex, which is stable from the largest step on
+    longest_run: float  # a run that would take longer is left out (s)
+    longest_timed_run: float  # a run that took longer is not timed again (s)
+    rounds: int  # how often a short run is timed, all models in turn; the least counts
+    # Between two samples of a reference, free and damped, the finer of two.
     reference_steps: tuple[int, int]
 
 

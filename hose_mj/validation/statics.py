@@ -1,7 +1,5 @@
 """The static cases: equilibria, frequencies, critical loads and twists with a closed form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial
@@ -43,6 +41,7 @@ from hose_mj.validation.modes import (
 _HOLDS: WeakKeyDictionary[HoseModel, list[Hold]] = WeakKeyDictionary()
 """The holds of a case's hose, from `lay` for `probe`."""
 _CANTILEVER = partial(make_case, spec=STOUT, lay=lay_cantilever, clamped=True)
+_CHAIN = partial(make_case, spec=CHAIN, gravity=DOWN)
 _IN_SPACE = partial(make_case, planar=False, models=("geds",))
 LARGEST_SPIN = 2.0
 """Clamps are spun by at most this at once, which models of rigid segments can follow (rad)."""
@@ -138,14 +137,7 @@ def make_hanging_chain() -> Case:
         unit = math.sqrt(GRAVITY / LENGTH)
         return np.asarray(compute_frequencies(hose.linearize(), 3, above=0.1 * unit) / unit)
 
-    return make_case(
-        "hanging-chain",
-        spec=CHAIN,
-        gravity=DOWN,
-        lay=lay,
-        probe=probe,
-        truth=reference.chain_frequencies,
-    )
+    return _CHAIN("hanging-chain", lay=lay, probe=probe, truth=reference.chain_frequencies)
 
 
 def make_catenary() -> Case:
@@ -162,14 +154,8 @@ def make_catenary() -> Case:
         pull = np.linalg.norm(hose.reaction(_HOLDS[hose][0]).force)
         return np.array([sag / LENGTH, pull / WEIGHT])
 
-    return make_case(
-        "catenary",
-        spec=CHAIN,
-        gravity=DOWN,
-        lay=lay,
-        probe=probe,
-        truth=lambda: np.array(reference.catenary(ratio)),
-    )
+    truth = partial(reference.catenary, ratio)
+    return _CHAIN("catenary", lay=lay, probe=probe, truth=lambda: np.array(truth()))
 
 
 def make_euler_buckling(ends: str) -> Case:
@@ -200,9 +186,9 @@ def _check_spline(hose: HoseModel) -> GedsHose:
     return hose
 
 
-def spin_clamp(hose: HoseModel, hold: Hold, angle: float, most: float = LARGEST_SPIN) -> None:
+def spin_clamp(hose: HoseModel, hold: Hold, angle: float) -> None:
     """Spins a clamp by an angle (rad), equilibrium after equilibrium."""
-    n_parts = max(math.ceil(abs(angle) / most), 1)
+    n_parts = max(math.ceil(abs(angle) / LARGEST_SPIN), 1)
     for _ in range(n_parts):
         hose.move(hold, spin=angle / n_parts)
         hose.solve_static()

@@ -1,7 +1,5 @@
 """Gathers what `hose-mj compare` runs: the cases, and GEDS's own numerics; or a user's hose."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -29,26 +27,19 @@ from hose_mj.validation.settings import FULL, QUICK
 from hose_mj.validation.user_hose.case import CASE_ID
 from hose_mj.validation.user_hose.study import UserHoseStudy, run_user_hose_study
 
-SHOWN_WITHIN = 0.01
-"""Pictures of a case show the cheapest run of each model within this error."""
+SHOWN_WITHIN = 0.01  # pictures of a case show the cheapest run of each model within this error
 N_RANDOM_STATES = 100_000
 N_RANDOM_STATES_QUICK = 500
 
 
 @dataclass(frozen=True)
 class CommittedRuns:
-    """Runs of MuJoCo's cable from a version that had it, for those that have none.
+    """Runs of MuJoCo's cable from a version that had it, for those that have none."""
 
-    Attributes:
-        mujoco: the version that they ran with.
-        cpu: of the machine that took the wall times.
-        here: the version of MuJoCo that is installed.
-        records: as in the document of `compare` (docs/documents.md), marked by a key `committed`.
-    """
-
-    mujoco: str
-    cpu: str
-    here: str
+    mujoco: str  # the version that they ran with
+    cpu: str  # of the machine that took the wall times
+    here: str  # the version of MuJoCo that is installed
+    # As in the document of `compare` (docs/documents.md), marked by a key `committed`.
     records: list[dict[str, Any]]
 
     def summarize(self) -> list[tuple[str, str, str]]:
@@ -61,26 +52,18 @@ class CommittedRuns:
 
 @dataclass
 class Study:
-    """Everything that was measured.
+    """Everything that was measured."""
 
-    Attributes:
-        results: one per case.
-        checks: of the cases, then of the numerics.
-        ratios: at equal error.
-        curves: convergence plots by title.
-        energy: times (s) and energy over its start of the ten-second swing; None if not run.
-        quick: whether the small grid was used.
-        user: what was found about a user's hose, whose runs are the one result; None without.
-        committed: what stands in for MuJoCo's cable; None where it runs, or was not asked for.
-    """
-
-    results: list[CaseResult] = field(default_factory=list)
-    checks: list[Check] = field(default_factory=list)
-    ratios: list[Ratio] = field(default_factory=list)
-    curves: dict[str, numerics.Curves] = field(default_factory=dict)
+    results: list[CaseResult] = field(default_factory=list)  # one per case
+    checks: list[Check] = field(default_factory=list)  # of the cases, then of the numerics
+    ratios: list[Ratio] = field(default_factory=list)  # at equal error
+    curves: dict[str, numerics.Curves] = field(default_factory=dict)  # convergence plots by title
+    # Times (s) and energy over its start of the ten-second swing; None if not run.
     energy: tuple[list[float], list[float]] | None = None
-    quick: bool = False
+    quick: bool = False  # whether the small grid was used
+    # What was found about a user's hose, whose runs are the one result; None without.
     user: UserHoseStudy | None = None
+    # What stands in for MuJoCo's cable; None where it runs, or was not asked for.
     committed: CommittedRuns | None = None
 
     @property

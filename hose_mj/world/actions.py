@@ -5,8 +5,6 @@ and in z for robots that are driven there. On the shipped floors these are the c
 task, so a state of the world is one of the line task (chapter 7).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 
@@ -19,18 +17,10 @@ from hose_mj.hoses.protocol import Array
 from hose_mj.world.driving import Driver
 from hose_mj.world.world import World
 
-STEPS = {
-    "up": (0, 1, 0),
-    "down": (0, -1, 0),
-    "left": (-1, 0, 0),
-    "right": (1, 0, 0),
-    "none": (0, 0, 0),
-    "+z": (0, 0, 1),
-    "-z": (0, 0, -1),
-}
-"""Cells by which each action moves a robot."""
-FLOOR_CELL = 0.05
-"""Width of the thesis's cells (m), for which its tolerances and times are stated."""
+# Cells by which each action moves a robot.
+STEPS = {"up": (0, 1, 0), "down": (0, -1, 0), "left": (-1, 0, 0), "right": (1, 0, 0)}
+STEPS |= {"none": (0, 0, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
+FLOOR_CELL = 0.05  # width of the thesis's cells (m), for which its tolerances and times are stated
 
 Mode = Literal["drive", "force"]
 Cells = npt.NDArray[np.int64]
@@ -39,8 +29,7 @@ Cells = npt.NDArray[np.int64]
 def compute_cells(world: World, points: Array) -> Cells:
     """c(P) = round((P - source) / cell size) of points (..., 3), m."""
     source = world.data.site_xpos[world.sites[-1]]
-    cells: Cells = np.round((points - source) / world.scene.cell_size).astype(np.int64)
-    return cells
+    return np.asarray(np.round((points - source) / world.scene.cell_size), dtype=np.int64)
 
 
 def compute_centres(world: World, cells: npt.ArrayLike) -> Array:
@@ -159,10 +148,8 @@ class Actions:
         if self.robot is None:
             return {}
         owner = self.world.scene.robots[self.robot].name
-        return {
-            **{"turn": self.turns, "owner": owner, "action": self.action},
-            "stalled": self.n_stalled,
-        }
+        told = {"turn": self.turns, "owner": owner, "action": self.action}
+        return {**told, "stalled": self.n_stalled}
 
     def _find_place(self) -> Array:
         return np.array(self.world.data.site_xpos[self.world.sites[self.robot]])

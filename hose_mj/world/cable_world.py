@@ -1,7 +1,5 @@
 """`CableWorld`: MuJoCo's composite cable among the bodies of a scene."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco
@@ -16,14 +14,13 @@ from hose_mj.hoses.spec import HoseSpec, check_number
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.mujoco_scene import HoseContact, Numerics
 from hose_mj.world.mujoco_world import MujocoWorld
+from hose_mj.world.world import check_scene
 
-_SAFETY = 0.5
-"""Of MuJoCo's default step over the largest stable one of a free chain."""
+_SAFETY = 0.5  # of MuJoCo's default step over the largest stable one of a free chain
 _LONGEST = 5e-4
 """Largest default step of MuJoCo's (s): a taut chain that jerks is stiff, whatever bends it."""
 
-_HIDDEN = 4
-"""Group of geoms that viewers do not draw unless asked."""
+_HIDDEN = 4  # group of geoms that viewers do not draw unless asked
 
 
 class CableWorld(MujocoWorld):
@@ -59,12 +56,12 @@ class CableWorld(MujocoWorld):
         substeps: int | None = None,
         torsional_stiffness: float | None = None,
     ) -> None:
+        check_scene(scene)
         spec = scene.spec
         twist = spec.torsional_stiffness if torsional_stiffness is None else torsional_stiffness
         check_number("torsional_stiffness", twist, may_be_zero=True)
         check_count("segments", segments, 2)
-        timestep = scene.timestep if timestep is None else timestep
-        check_number("timestep", timestep)
+        timestep = check_number("timestep", scene.timestep if timestep is None else timestep)
         self._layout = chain_layout.ChainLayout(spec.length, segments)
         self._kind = BallJoints(spec, twist)
         arcs = np.array([*(robot.arc_length for robot in scene.robots), 0.0])

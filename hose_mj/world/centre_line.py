@@ -11,15 +11,10 @@ from hose_mj.hoses.protocol import Array
 
 @dataclass(frozen=True)
 class CentreLine:
-    """r(s) = sum_j c[k, j] u^j with u = (s - s_k) / (s_(k+1) - s_k) on piece k of K.
+    """r(s) = sum_j c[k, j] u^j with u = (s - s_k) / (s_(k+1) - s_k) on piece k of K."""
 
-    Attributes:
-        arc_lengths: s_k, rising from 0 to L, (K + 1,), m.
-        coefficients: c, (K, 4, 3), m; a straight piece has zeros for j = 2, 3.
-    """
-
-    arc_lengths: Array
-    coefficients: Array
+    arc_lengths: Array  # s_k, rising from 0 to L, (K + 1,), m
+    coefficients: Array  # c, (K, 4, 3), m; a straight piece has zeros for j = 2, 3
 
     @classmethod
     def of_spline(cls, arc_lengths: Array, points: Array, slopes: Array) -> CentreLine:

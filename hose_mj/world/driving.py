@@ -1,7 +1,5 @@
 """`Driver`: motors bring each robot's site to a place, whatever kind of robot it is."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

@@ -1,7 +1,5 @@
 """`FlexWorld`: MuJoCo's 1-D flex among the bodies of a scene."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 
@@ -14,6 +12,7 @@ from hose_mj.hoses.spec import HoseSpec
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.mujoco_scene import PREFIX, HoseContact, Numerics
 from hose_mj.world.mujoco_world import MujocoWorld
+from hose_mj.world.world import check_scene
 
 
 class FlexWorld(MujocoWorld):
@@ -40,13 +39,9 @@ class FlexWorld(MujocoWorld):
     _advice = "try a smaller timestep, or more substeps"
 
     def __init__(
-        self,
-        scene: Scene,
-        *,
-        timestep: float | None = None,
-        segments: int = 40,
-        substeps: int = 1,
+        self, scene: Scene, *, timestep: float | None = None, segments: int = 40, substeps: int = 1
     ) -> None:
+        check_scene(scene)
         check_count("segments", segments, 2)
         places = (*(robot.arc_length for robot in scene.robots), 0.0)
         holds = [Hold(k, s, False) for k, s in enumerate(places)]

@@ -16,12 +16,10 @@ from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.protocol import Array
 from hose_mj.world.scene_geoms import SceneGeoms
 
-_REACH = 2.0
-"""Meshes nearer than so many radii of the hose are measured."""
+_REACH = 2.0  # meshes nearer than so many radii of the hose are measured
 PROBE = "hose_mj_probe"
 """Name of a geom, a small sphere that touches nothing, which stands for a point of the hose."""
-_PROBE_RADIUS = 1e-4
-"""Small beside a hose (m); taken off the distances that MuJoCo finds."""
+_PROBE_RADIUS = 1e-4  # small beside a hose (m); taken off the distances that MuJoCo finds
 
 
 class GedsContact:

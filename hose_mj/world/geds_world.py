@@ -5,8 +5,6 @@ which both meet at the attachments, and goes on until they do. Hose and bodies e
 same impulses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -18,12 +16,13 @@ from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array, Hold
+from hose_mj.hoses.spec import check_number
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.geds_contact import GedsContact, add_probe
 from hose_mj.world.initial_shape import count_control_points, relax_initial_shape
 from hose_mj.world.planar_point_robots import PlanarPointRobots
-from hose_mj.world.world import World
+from hose_mj.world.world import World, check_scene
 
 GAP = 1e-6
 """Largest distance of hose and site at the end of a step (m), where `MOST_ITERATIONS` suffice."""
@@ -63,7 +62,9 @@ class GedsWorld(World):
         scheme: str = "bdf2",
         compiled_pucks: bool = True,
     ) -> None:
-        if scheme == "verlet":
+        check_scene(scene)
+        timestep = scene.timestep if timestep is None else check_number("timestep", timestep)
+        if isinstance(scheme, str) and scheme == "verlet":
             raise InputError("scheme", scheme, "an implicit scheme for a hose on bodies")
         spec = scene.make_spec()
         add_probe(spec)
@@ -71,16 +72,11 @@ class GedsWorld(World):
         super().__init__(scene, model)
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-        model.opt.timestep = scene.timestep if timestep is None else timestep
+        model.opt.timestep = timestep
         n = count_control_points(self.n_robots) if control_points is None else control_points
-        self.hose = GedsHose(
-            scene.spec,
-            timestep=model.opt.timestep,
-            gravity=model.opt.gravity,
-            control_points=n,
-            scheme=scheme,
-            tolerance=1e-6,
-        )
+        options: Any = {"control_points": n, "scheme": scheme, "tolerance": 1e-6}
+        options |= {"timestep": model.opt.timestep, "gravity": model.opt.gravity}
+        self.hose = GedsHose(scene.spec, **options)
         self.coupling_iterations = 0
         self._start_bodies()
         self._contact = GedsContact(self.model, self.data, self.hose, self.sites, self.arc_lengths)
@@ -232,17 +228,13 @@ class GedsWorld(World):
 
 
 class _Iterate(NamedTuple):
-    """An iterate of the coupling: how near hose and bodies have come (m), with which forces (N).
+    """An iterate of the coupling of hose and bodies."""
 
-    `reached` is where the bodies' sites are at the end of the step (m); `aim` and `compliance`
-    are the linear answer of the bodies that the hose was solved for.
-    """
-
-    gap: float
-    forces: Array
-    reached: Array
-    aim: Array
-    compliance: Array
+    gap: float  # how near hose and bodies have come (m)
+    forces: Array  # with which (N)
+    reached: Array  # where the bodies' sites are at the end of the step (m)
+    aim: Array  # of the linear answer of the bodies that the hose was solved for
+    compliance: Array  # likewise
 
 
 _QUADRATIC = int(mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC)

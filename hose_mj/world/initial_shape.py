@@ -1,7 +1,5 @@
 """How a hose lies when a scene starts: at rest between its attachments, round what is there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -13,15 +11,11 @@ from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
 
-N_POINTS = 257
-"""Points of a start shape."""
-_DRAG = 4.0
-"""Drag over linear density while the hose comes to rest (1/s)."""
-_NEAR = 4
-"""Points on either side of an attachment that may be near each other."""
+N_POINTS = 257  # points of a start shape
+_DRAG = 4.0  # drag over linear density while the hose comes to rest (1/s)
+_NEAR = 4  # points on either side of an attachment that may be near each other
 _STEP, _DURATION = 0.004, 4.0
-_MOST_WAVES = 6
-"""Half waves between neighbours at most."""
+_MOST_WAVES = 6  # half waves between neighbours at most
 
 
 def count_control_points(n_robots: int) -> int:

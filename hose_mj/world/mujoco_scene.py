@@ -7,8 +7,6 @@ Planes have a bit of their own: of a capsule they touch the two ends, so spheres
 the same contacts, each of them once.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 
@@ -25,10 +23,8 @@ from hose_mj.scenes.mjcf.model import reset_to_start
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.world.scene_geoms import OWN_ARC, SceneGeoms, compute_radius, find_colliding
 
-PREFIX = "hose/"
-"""Of the names of all that is added to a scene."""
-HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]
-"""MuJoCo's solimp of ties and edges."""
+PREFIX = "hose/"  # of the names of all that is added to a scene
+HARD = [0.9999, 0.9999, 0.001, 0.5, 2.0]  # MuJoCo's solimp of ties and edges
 
 
 @dataclass(frozen=True)
@@ -112,22 +108,15 @@ _TORSION, _ROLLING = 0.005, 0.0001
 
 @dataclass(frozen=True)
 class HoseContact:
-    """How the hose touches things.
+    """How the hose touches things."""
 
-    Attributes:
-        friction: MuJoCo's five coefficients, of which the first two, Coulomb's, count.
-        priority: above that of all geoms of the scene: in a contact with the hose its friction and
-            hardness count.
-        solref: critically damped, two of the world's time steps.
-        bits: contype of each piece of the hose (N,), for all but planes.
-        plane_bit: contype for planes.
-    """
-
-    friction: list[float]
+    friction: list[float]  # MuJoCo's five coefficients, of which the first two, Coulomb's, count
+    # Above that of all geoms of the scene: in a contact with the hose its friction and hardness
+    # count.
     priority: int
-    solref: list[float]
-    bits: np.ndarray
-    plane_bit: int
+    solref: list[float]  # critically damped, two of the world's time steps
+    bits: np.ndarray  # contype of each piece of the hose (N,), for all but planes
+    plane_bit: int  # contype for planes
 
     def write(self, item: mujoco.MjsGeom | mujoco.MjsFlex, bits: int) -> None:
         """Lets a geom or flex of the hose touch what takes on these bits."""

@@ -4,8 +4,6 @@ cable_world.py and flex_world.py say what the hose is made of. MuJoCo solves bod
 between them and all contacts in one step.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
@@ -29,10 +27,8 @@ from hose_mj.world.centre_line import CentreLine
 from hose_mj.world.initial_shape import N_POINTS, relax_initial_shape
 from hose_mj.world.world import World
 
-_ROUNDS = 50
-"""Newton steps of `fit_chain` at most; a chain that can reach takes a few."""
-_TOLERANCE = 1e-13
-"""Error of a fitted chain over its length: rounding."""
+_ROUNDS = 50  # Newton steps of `fit_chain` at most; a chain that can reach takes a few
+_TOLERANCE = 1e-13  # error of a fitted chain over its length: rounding
 
 
 class MujocoWorld(World):
@@ -60,10 +56,8 @@ class MujocoWorld(World):
         InputError: a value outside its valid set, a hose or a scene that MuJoCo cannot model.
     """
 
-    _advice: str
-    """What to try where the hose is unstable."""
-    _tension_places: Array
-    """Arc lengths where tensions are known (m)."""
+    _advice: str  # what to try where the hose is unstable
+    _tension_places: Array  # arc lengths where tensions are known (m)
 
     def __init__(self, scene: Scene, nodes: Array, numerics: mujoco_scene.Numerics) -> None:
         check_plain(type(self).__name__, scene.spec)
@@ -201,7 +195,7 @@ class MujocoWorld(World):
                 mujoco.mj_step(self.model, self.data)
                 total += self._find_hold_forces()
         if went_bad(self.data):
-            self.restore(before)
+            self._restore(before)
             raise StepError(
                 f"MuJoCo met a NaN or a huge number in the step from time {self.time:g} s at "
                 f"timestep {self.timestep:g} s in {self.substeps} substeps: {self._advice}"

@@ -201,11 +201,6 @@ def _find_walls(model: mujoco.MjModel, data: mujoco.MjData, flat: bool) -> list[
         else:
             size = tuple(model.geom_size[g])
         walls.append(
-            Obstacle(
-                kind=kind,
-                position=data.geom_xpos[g],
-                rotation=data.geom_xmat[g],
-                size=size,
-            )
+            Obstacle(kind=kind, position=data.geom_xpos[g], rotation=data.geom_xmat[g], size=size)
         )
     return walls

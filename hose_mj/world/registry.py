@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hose_mj.errors import check_choice
-from hose_mj.hoses.registry import check_model
-from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
-from hose_mj.world.world import World
+from hose_mj.hoses.registry import check_model, check_options
+
+if TYPE_CHECKING:
+    from hose_mj.scenes.mjcf.scene import Scene
+    from hose_mj.world.world import World
 
 WORLDS = {
     "geds": "hose_mj.world.geds_world:GedsWorld",
@@ -30,10 +32,13 @@ def make_world(scene: Scene | str | Path, model: str = "geds", **options: Any) -
     Raises:
         InputError: an unknown scene, model or option, or what reading the scene finds wrong.
     """
+    from hose_mj.scenes.mjcf.scene import Scene, find_scene, read_scene
+
     check_choice("model", model, WORLDS)
     check_model(model)
     module, _, name = WORLDS[model].partition(":")
     world_class: type[World] = getattr(import_module(module), name)
+    check_options(model, world_class, options)
     if not isinstance(scene, Scene):
         scene = read_scene(find_scene(scene))
     return world_class(scene, **options)

@@ -25,21 +25,13 @@ OWN_ARC = 3.0
 
 @dataclass(frozen=True)
 class SceneGeoms:
-    """The geoms of a scene that a hose may touch.
+    """The geoms of a scene that a hose may touch."""
 
-    Attributes:
-        ids: of those that are obstacles, (G,).
-        measured: ids of those that MuJoCo measures, (M,).
-        moving: places in `ids` of those whose bodies can move.
-        skips: arc lengths between which each of `ids` is not touched, (G, 2), m.
-        measured_skips: the same for `measured`, (M, 2), m.
-    """
-
-    ids: np.ndarray
-    measured: np.ndarray
-    moving: np.ndarray
-    skips: Array
-    measured_skips: Array
+    ids: np.ndarray  # of those that are obstacles, (G,)
+    measured: np.ndarray  # ids of those that MuJoCo measures, (M,)
+    moving: np.ndarray  # places in `ids` of those whose bodies can move
+    skips: Array  # arc lengths between which each of `ids` is not touched, (G, 2), m
+    measured_skips: Array  # the same for `measured`, (M, 2), m
 
     @classmethod
     def find(

@@ -43,23 +43,16 @@ _MOTOR = {
 
 @dataclass(frozen=True)
 class Motors:
-    """The motors of one robot.
+    """The motors of one robot."""
 
-    Attributes:
-        robot: its number.
-        ids: of the actuators (k,).
-        gains: force of a control of 1 (k,), N or N m.
-        low, high: the controls allowed (k,); infinite where there is no limit.
-        chain: the degrees of freedom between the world and the robot's site (c,).
-        in_chain: which of the motors pull at these (k,); the others turn wheels or the like.
-    """
-
-    robot: int
-    ids: Indices
-    gains: Array
+    robot: int  # its number
+    ids: Indices  # of the actuators (k,)
+    gains: Array  # force of a control of 1 (k,), N or N m
+    # low, high: the controls allowed (k,); infinite where there is no limit.
     low: Array
     high: Array
-    chain: Indices
+    chain: Indices  # the degrees of freedom between the world and the robot's site (c,)
+    # Which of the motors pull at these (k,); the others turn wheels or the like.
     in_chain: npt.NDArray[np.bool_]
 
     def choose(self, which: npt.NDArray[np.bool_]) -> Motors:
@@ -71,10 +64,8 @@ class Motors:
 def find_motors(world: World) -> list[Motors]:
     """Returns the motors of each robot, the tip's first.
 
-    A motor is a robot's when it pulls at a joint of the robot's bodies.
-
-    Raises:
-        InputError: an actuator of a robot that is no motor.
+    A motor is a robot's when it pulls at a joint of the robot's bodies. `InputError` is raised for
+    an actuator of a robot that is no motor.
     """
     model = world.model
     data = mujoco.MjData(model)
@@ -137,8 +128,7 @@ def _read_limits(model: mujoco.MjModel, ids: Indices) -> tuple[Array, Array]:
     return low, high
 
 
-_RANK = 1e-9
-"""Relative size below which a direction counts as out of the motors' reach."""
+_RANK = 1e-9  # relative size below which a direction counts as out of the motors' reach
 _TINY = 1e-12
 
 
@@ -277,19 +267,13 @@ def _compute_braking(motors: Motors, gains: Array) -> float:
     return 0.5 * float(np.min(reach, initial=np.inf))
 
 
-DRIVING_RATE = 4.0
-"""Wanted speed by distance (1/s)."""
-TURNING_RATE = 5.0
-"""Wanted turning speed by angle (1/s)."""
-FASTEST_TURN = 2.5
-"""rad/s."""
-WHEEL_RATE = 25.0
-"""How fast a wheel's speed follows (1/s)."""
-_KEPT = 0.2
-"""Cosine up to which the direction of driving, forwards or backwards, is kept."""
+DRIVING_RATE = 4.0  # wanted speed by distance (1/s)
+TURNING_RATE = 5.0  # wanted turning speed by angle (1/s)
+FASTEST_TURN = 2.5  # rad/s
+WHEEL_RATE = 25.0  # how fast a wheel's speed follows (1/s)
+_KEPT = 0.2  # cosine up to which the direction of driving, forwards or backwards, is kept
 _PARALLEL = 1e-3
-_SHARE_OF_GRIP = 0.25
-"""Acceleration that braking counts on, as a share of gravity's."""
+_SHARE_OF_GRIP = 0.25  # acceleration that braking counts on, as a share of gravity's
 _ROUND = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
     for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "MESH")

@@ -6,8 +6,6 @@ the same shape (initial_shape.py) and answer the same questions. Frame: the worl
 length 0 is at the source, L at the tip.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any
 from warnings import warn
@@ -17,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_count, check_vector
+from hose_mj.hoses.inputs import check_count, check_vector, restore_snapshot
 from hose_mj.hoses.protocol import Array
 from hose_mj.scenes.mjcf.model import reset_to_start
 from hose_mj.scenes.mjcf.scene import Scene
+from hose_mj.toml_table import LARGEST_NUMBER
 from hose_mj.world.centre_line import CentreLine
 
 
@@ -44,8 +43,7 @@ class World(ABC):
         robot_forces: what `apply_force` has set, (N, 3), N.
     """
 
-    hose_model: str
-    """Name of the hose's model."""
+    hose_model: str  # name of the hose's model
 
     def __init__(self, scene: Scene, model: mujoco.MjModel) -> None:
         self.scene, self.model, self.data = scene, model, mujoco.MjData(model)
@@ -159,9 +157,10 @@ class World(ABC):
         self.robot_forces[robot] = check_vector("force", force)
 
     def check_control(self) -> None:
-        """Raises `InputError` for a control that is not finite."""
-        if not np.isfinite(self.control).all():
-            raise InputError("control", self.control.tolist(), "finite numbers")
+        """Raises `InputError` for a control that is not finite, or absurdly large."""
+        if not (np.abs(self.control) <= LARGEST_NUMBER).all():
+            valid = f"finite numbers, each at most {LARGEST_NUMBER:g}"
+            raise InputError("control", self.control.tolist(), valid)
 
     # -- state -------------------------------------------------------------------------------------
 
@@ -177,7 +176,10 @@ class World(ABC):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot of this world; `InputError` for one of another."""
+        """Returns to a snapshot of this world; `InputError` for what is none."""
+        restore_snapshot(state, self.snapshot(), self._restore)
+
+    def _restore(self, state: dict[str, Any]) -> None:
         size = mujoco.mj_stateSize(self.model, _STATE)
         if state["mujoco"].shape != (size,):
             raise InputError("size of the state", state["mujoco"].shape, "a snapshot of this world")
@@ -211,6 +213,12 @@ class World(ABC):
                     *(self.model, self.data, force, np.zeros(3), point),
                     *(body, self.data.qfrc_applied),
                 )
+
+
+def check_scene(scene: object) -> None:
+    """Raises `InputError` for what is no `Scene`."""
+    if not isinstance(scene, Scene):
+        raise InputError("scene", scene, "a Scene, as read_scene returns it")
 
 
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION

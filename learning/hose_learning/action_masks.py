@@ -4,8 +4,6 @@
 `action_masks()`, which sb3-contrib's MaskablePPO asks for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
@@ -38,14 +36,7 @@ class SharedPolicyEnv(gymnasium.Env[Any, Any]):
 
     `info` holds `action_mask` (int8, of the agent whose turn it is) and `events` (names).
 
-    Args:
-        task: id of a task, or a task.
-        observe: names of the variables to show; None for all.
-        rewards: reward signals whose sum is the reward; None for all.
-        options: options of the task.
-
-    Attributes:
-        task, episode: what is played.
+    Arguments are those of `hose_mj.envs.gym.TaskEnv`; `task` and `episode` are what is played.
 
     Raises:
         InputError: an unknown task, option or name, or a value outside its valid set.

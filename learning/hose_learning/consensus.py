@@ -9,56 +9,41 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
 
 from hose_mj.errors import InputError
 from hose_mj.recording.palette import OTHERS, darken, format_hex
-from hose_mj.recording.plots.labels import label_line_ends
-from hose_mj.recording.plots.style import SOFT, encode_png, make_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
-IDLE = -1
-"""The turn of an agent that is not acting."""
+IDLE = -1  # the turn of an agent that is not acting
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConsensusSettings:
-    """A network of clocks.
+    """A network of clocks; `InputError` for a value outside its range."""
 
-    Attributes:
-        n_agents: N.
-        loss: probability that a message is lost, each on its own.
-        delay: largest delay of a message, in rounds; each has a uniform one of 0 .. delay.
-        drift: largest relative error of a clock's rate; each has a uniform one of +- drift.
-        rounds: rounds of messages in one turn.
-        offset: the first clocks are uniform between 0 and this many turns.
-        first_turn: turns before this one are left to the clocks to agree; nobody acts in them.
-        n_turns: turns that are played.
-        action_time: longest action, in turns; durations are uniform from 0 on.
-        early_finish: whether an agent that is done gives the turn at once, xi_i <- t_i + 1, or lets
-            it run out.
-        falls_back: whether the mean with others' clocks may take a clock back below a turn that it
-            has reached, as the thesis has it; see `simulate`.
-
-    Raises:
-        InputError: a value outside its range.
-    """
-
-    n_agents: int = 4
-    loss: float = 0.1
-    delay: int = 1
+    n_agents: int = 4  # N
+    loss: float = 0.1  # probability that a message is lost, each on its own
+    delay: int = 1  # largest delay of a message, in rounds; each has a uniform one of 0 .. delay
+    # Largest relative error of a clock's rate; each has a uniform one of +- drift.
     drift: float = 0.02
-    rounds: int = 50
-    offset: float = 3.0
+    rounds: int = 50  # rounds of messages in one turn
+    offset: float = 3.0  # the first clocks are uniform between 0 and this many turns
+    # Turns before this one are left to the clocks to agree; nobody acts in them.
     first_turn: int = 6
-    n_turns: int = 60
-    action_time: float = 0.5
+    n_turns: int = 60  # turns that are played
+    action_time: float = 0.5  # longest action, in turns; durations are uniform from 0 on
+    # Whether an agent that is done gives the turn at once, xi_i <- t_i + 1, or lets it run out.
     early_finish: bool = True
+    # Whether the mean with others' clocks may take a clock back below a turn that it has reached,
+    # as the thesis has it; see `simulate`.
     falls_back: bool = False
 
     def __post_init__(self) -> None:
@@ -84,15 +69,11 @@ def _check_between(name: str, value: float, low: float, high: float, whole: bool
 
 
 class Messages(NamedTuple):
-    """What arrives in one round.
+    """What arrives in one round."""
 
-    Attributes:
-        heard: whether agent i gets a message of agent j (N, N); none from itself.
-        ages: rounds since agent j sent it (N, N).
-    """
-
+    # Whether agent i gets a message of agent j (N, N); none from itself.
     heard: npt.NDArray[np.bool_]
-    ages: Integers
+    ages: Integers  # rounds since agent j sent it (N, N)
 
 
 class Action(NamedTuple):
@@ -106,15 +87,12 @@ class Action(NamedTuple):
 
 @dataclass(frozen=True)
 class Record:
-    """What a simulation saw: rates v_i (N,), turns per unit of time; clocks; actions as they began.
+    """What a simulation saw."""
 
-    `clocks` are xi_i at the beginning of each round (n_rounds, N), `round_time` apart.
-    """
-
-    rates: Floats
-    clocks: Floats
-    actions: tuple[Action, ...]
-    round_time: float
+    rates: Floats  # v_i (N,), turns per unit of time
+    clocks: Floats  # xi_i at the beginning of each round (n_rounds, N)
+    actions: tuple[Action, ...]  # as they began
+    round_time: float  # between two rounds
 
     @property
     def times(self) -> Floats:
@@ -268,18 +246,6 @@ def compute_longest_action(lead: float, drift: float) -> float:
     return (1.0 - lead) / (1.0 + drift)
 
 
-def compute_contraction(n_agents: int, loss: float) -> float:
-    """Returns the factor by which a round shrinks the mean squared disagreement, without delay.
-
-    With q = 1 - p the share of messages that arrive and x_i the clocks about their mean, a round
-    leaves E[x_i'] = p x_i, and adds to each the variance p q / N^2 sum_j (x_i - x_j)^2. Summed up,
-    and less the variance of the mean, the sum of squares shrinks by
-
-        lambda = p^2 + 2 p q (N - 1) / N^2.
-    """
-    return loss**2 + 2.0 * loss * (1.0 - loss) * (n_agents - 1) / n_agents**2
-
-
 def compute_speed(settings: ConsensusSettings) -> float:
     """Returns how fast the agreed clock runs without drift, in turns per unit of time.
 
@@ -297,7 +263,7 @@ def compute_disagreement(settings: ConsensusSettings, rates: Floats, n_rounds: i
     with rates v_i (N,), agents that act left aside; it settles within some tens of rounds. Without
     delay the value is
 
-        sqrt((1 + p) / ((1 - p) (1 - lambda))) h std(v_i).
+        sqrt((1 + p) / ((1 - p) (1 - lambda))) h std(v_i), lambda = p^2 + 2 p (1 - p) (N - 1) / N^2.
     """
     n, kept = settings.n_agents, settings.delay + 1
     arrive = 1.0 - settings.loss
@@ -344,8 +310,7 @@ def _compute_noise(settings: ConsensusSettings, second: Floats) -> Floats:
 
 SETTLING_TURNS, MEASURED_TURNS = 10, 40
 """Turns after which clocks that run alone have agreed, and turns measured from then on."""
-SHOWN_TURNS = 1.0
-"""Time during which the agreement is shown, in turns."""
+SHOWN_TURNS = 1.0  # time during which the agreement is shown, in turns
 SHOWN_ACTIONS = 16
 
 
@@ -386,6 +351,9 @@ def run_trial(settings: ConsensusSettings, seed: int) -> ConsensusTrial:
 
 def draw_consensus(trials: Sequence[ConsensusTrial], own: ConsensusTrial) -> bytes:
     """Returns the PNG: disagreement of all trials over time above, the actions of one below."""
+    from hose_mj.recording.plots.labels import label_line_ends
+    from hose_mj.recording.plots.style import encode_png, make_figure
+
     n = own.settings.n_agents
     with make_figure((7.6, 5.6), f"{n} clocks agree on whose turn it is") as figure:
         above, below = figure.subplots(2, 1, height_ratios=(3, 2))
@@ -419,6 +387,8 @@ def _draw_agreement(axes: Axes, trials: Sequence[ConsensusTrial]) -> list[tuple[
 
 def _draw_actions(axes: Axes, trial: ConsensusTrial) -> None:
     """Draws a bar for each action, with its turn, on the line of its agent."""
+    from hose_mj.recording.plots.style import SOFT
+
     settings = trial.settings
     shown = trial.play.actions[:SHOWN_ACTIONS]
     for action in shown:

@@ -1,7 +1,5 @@
 """Greedy episodes of what a learner has learned so far: in turns, jointly, or composed (6.4)."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -7,7 +7,6 @@ relevance of state variables (Algorithm 5.1).
 from __future__ import annotations
 
 import io
-import zipfile
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -25,26 +24,19 @@ from hose_mj.tasks.task import Task
 
 Bools = npt.NDArray[np.bool_]
 
-_NAMES = ("variables", "agent_names", "action_names", "event_names", "reward_names")
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Experience:
-    """A log of n moves of a task, by its id; the arrays are those of `hose_learning.loop.Rows`.
+    """A log of n moves of a task; the arrays are those of `hose_learning.loop.Rows`."""
 
-    `variables` names the columns of `values`, each with a number of values (n_variables,), and
-    `reward_names` those of `rewards`; agents and actions are named by number, event k is bit k.
-    `violations` are the events that break a constraint, as bits.
-    """
-
-    task: str
-    variables: tuple[str, ...]
-    cardinalities: Integers
-    agent_names: tuple[str, ...]
+    task: str  # its id
+    variables: tuple[str, ...]  # the columns of `values`
+    cardinalities: Integers  # how many values each has (n_variables,)
+    agent_names: tuple[str, ...]  # by number, as those of the actions
     action_names: tuple[str, ...]
-    event_names: tuple[str, ...]
-    reward_names: tuple[str, ...]
-    violations: int
+    event_names: tuple[str, ...]  # event k is bit k
+    reward_names: tuple[str, ...]  # the columns of `rewards`
+    violations: int  # the events that break a constraint, as bits
     values: Integers
     agents: Integers
     actions: Integers
@@ -58,8 +50,7 @@ class Experience:
     @property
     def undesired(self) -> Bools:
         """Whether each move broke a constraint: the class c_1 of chapter 8 (n,)."""
-        broken: Bools = (self.events & self.violations) != 0
-        return broken
+        return (self.events & self.violations) != 0
 
     def select(self, agent: int) -> Experience:
         """Returns the moves of one agent."""
@@ -117,20 +108,3 @@ def write_experience(path: Path, experience: Experience) -> None:
     }
     np.savez_compressed(data, **entries)
     write_atomically(path, data.getvalue())
-
-
-def read_experience(path: Path) -> Experience:
-    """Reads a log; `InputError` for what `write_experience` did not write."""
-    valid = "a file written by write_experience"
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            entries = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError("experience", str(path), f"{valid} ({error})") from error
-    if set(entries) != {field.name for field in fields(Experience)}:
-        raise InputError("experience", str(path), valid)
-    restored: dict[str, Any] = dict(entries)
-    restored["task"], restored["violations"] = str(entries["task"]), int(entries["violations"])
-    for name in _NAMES:
-        restored[name] = tuple(entries[name].tolist())
-    return Experience(**restored)

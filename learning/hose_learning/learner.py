@@ -1,7 +1,5 @@
 """Makes a learner's records from its settings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -17,8 +15,7 @@ from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-Made = tuple[records.Learner, Memory]
-"""What the factory of a learner returns."""
+Made = tuple[records.Learner, Memory]  # what the factory of a learner returns
 
 
 def make_learner(

@@ -7,8 +7,6 @@ other. Both stop after a number of moves or episodes, when the log is full, or w
 to be; calling them again goes on exactly where they stopped.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from hose_learning import records, rules
@@ -227,23 +225,14 @@ def run_joint(
 
 
 class Rows(NamedTuple):
-    """One row for each move of an agent.
+    """One row for each move of an agent."""
 
-    Attributes:
-        values: all variables as the mover saw them before the move (n, n_variables).
-        agents: who moved (n,).
-        actions: its action (n,).
-        events: what the move caused, as bits (n,).
-        rewards: what the mover got for it, by signal (n, n_signals).
-        next_values: what the mover saw right after its move, before anyone else's
-            (n, n_variables).
-    """
-
-    values: Integers
-    agents: Integers
-    actions: Integers
-    events: Integers
-    rewards: Floats
+    values: Integers  # all variables as the mover saw them before the move (n, n_variables)
+    agents: Integers  # who moved (n,)
+    actions: Integers  # its action (n,)
+    events: Integers  # what the move caused, as bits (n,)
+    rewards: Floats  # what the mover got for it, by signal (n, n_signals)
+    # What the mover saw right after its move, before anyone else's (n, n_variables).
     next_values: Integers
 
 

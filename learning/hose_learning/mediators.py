@@ -1,7 +1,5 @@
 """Mediators: one score for each action from the Q-values of several modules (section 3.5.1)."""
 
-from __future__ import annotations
-
 import math
 
 from hose_learning.records import Learner, Memory

@@ -5,8 +5,6 @@ with a threshold it also vetoes what lies below it (Definition 4). A *veto* modu
 actions led to certain events in what it sees, and vetoes them from then on (section 5.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -24,31 +22,19 @@ Credit = Literal["cycle", "own"]
 
 @dataclass(frozen=True, kw_only=True)
 class Module:
-    """What one module sees and learns from.
+    """What one module sees and learns from; `InputError` for an unknown kind or credit."""
 
-    Attributes:
-        name: for messages and listings.
-        variables: names of the task's variables; none at all is a single state.
-        kind: "value" or "veto".
-        signals: reward signals that a value module adds up.
-        events: events that a veto module answers to.
-        credit: who learns from a reward or an event: everyone who acted within the "cycle", or
-            the mover for its "own" action alone.
-        threshold: a value module vetoes actions whose values lie below it; None vetoes nothing.
-        actions: the actions that a veto module is about; by default all of them.
-
-    Raises:
-        InputError: an unknown kind or credit.
-    """
-
-    name: str
-    variables: tuple[str, ...]
-    kind: Kind = "value"
-    signals: tuple[str, ...] = ()
-    events: tuple[str, ...] = ()
+    name: str  # for messages and listings
+    variables: tuple[str, ...]  # names of the task's variables; none at all is a single state
+    kind: Kind = "value"  # "value" or "veto"
+    signals: tuple[str, ...] = ()  # reward signals that a value module adds up
+    events: tuple[str, ...] = ()  # events that a veto module answers to
+    # Who learns from a reward or an event: everyone who acted within the "cycle", or the mover for
+    # its "own" action alone.
     credit: Credit = "cycle"
+    # A value module vetoes actions whose values lie below it; None vetoes nothing.
     threshold: float | None = None
-    actions: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()  # the actions that a veto module is about; by default all of them
 
     def __post_init__(self) -> None:
         for name, choices in (("kind", get_args(Kind)), ("credit", get_args(Credit))):
@@ -57,17 +43,12 @@ class Module:
 
 @dataclass(frozen=True)
 class Arrays:
-    """What loops need of modules of one kind.
+    """What loops need of modules of one kind."""
 
-    A variable has a place among all and adds a stride to the key for each step, 0 where it pads
-    (n_modules, width); `bases` are the first key of each agent (n_modules, n_agents), `size` is the
-    number of keys.
-    """
-
-    columns: Integers
-    strides: Integers
-    bases: Integers
-    size: int
+    columns: Integers  # the variables' places among all (n_modules, width)
+    strides: Integers  # what a step of each adds to the key; 0 where it pads (n_modules, width)
+    bases: Integers  # the first key of each agent (n_modules, n_agents)
+    size: int  # number of keys
 
 
 def make_arrays(task: Task, modules: Sequence[Module], n_parts: int) -> Arrays:

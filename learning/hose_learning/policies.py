@@ -1,15 +1,12 @@
 """How an action is chosen among those that are allowed, given as bits of one integer."""
 
-from __future__ import annotations
-
 import math
 
 from hose_mj.jit import jitable
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.stream import Stream, draw_below, draw_unit
 
-GREEDY, SOFT_MAX = 0, 1
-"""Epsilon-greedy (eq. 3.6) and soft max (eq. 3.5)."""
+GREEDY, SOFT_MAX = 0, 1  # epsilon-greedy (eq. 3.6) and soft max (eq. 3.5)
 
 
 @jitable

@@ -1,7 +1,5 @@
 """Ready modules for the tasks of the thesis: what its chapters let goal and veto modules see."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,36 +14,28 @@ for all rewards that sees the whole state."""
 VETOES = ("none", "modules", "monolithic", "thresholds", "values")
 """No vetoes; a boolean module for each constraint (section 5.3); one on the whole state; a value
 module for each with a threshold (section 4.5); such modules without a threshold (Algorithm 4.1)."""
-VETO_THRESHOLD = -10.0
-"""v_t of section 4.6."""
+VETO_THRESHOLD = -10.0  # v_t of section 4.6
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """What one way to break a constraint has to do with.
-
-    Variables tell it; `actions` are those concerned, none for all.
-    """
+    """What one way to break a constraint has to do with."""
 
     name: str
-    variables: tuple[str, ...]
+    variables: tuple[str, ...]  # tell it
     events: tuple[str, ...]
     signals: tuple[str, ...]
-    actions: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()  # those concerned, none for all
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a task consists of for a modular learner, each part as names of variables.
+    """What a task consists of for a modular learner, each part as names of variables."""
 
-    `state` are those that together are the whole state, as far as it matters; the goal module sees
-    `goal`, or `local`, what is near the agent, and learns from `signals`.
-    """
-
-    state: tuple[str, ...]
-    goal: tuple[str, ...]
-    local: tuple[str, ...]
-    signals: tuple[str, ...]
+    state: tuple[str, ...]  # together the whole state, as far as it matters
+    goal: tuple[str, ...]  # what the goal module sees
+    local: tuple[str, ...]  # or what of it is near the agent
+    signals: tuple[str, ...]  # what the goal module learns from
     constraints: tuple[Constraint, ...]
 
 

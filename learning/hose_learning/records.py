@@ -3,8 +3,6 @@
 `hose_learning.learner.make_learner` makes both from settings.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,113 +19,78 @@ MOVES, EPISODES, SUCCESSES, FRESH = 0, 1, 2, 3
 """Places in `Memory.counters`: moves of single agents, episodes ended, those with success, and
 whether the state has to be reset before the next move."""
 N_COUNTERS = 4
-N_LOGGED = 2
-"""Logged of an episode: its moves, and the events that it ended with."""
+N_LOGGED = 2  # logged of an episode: its moves, and the events that it ended with
 
 
 class Learner(NamedTuple):
-    """What a learner is: its modules, mediator, policy and rule.
+    """What a learner is: its modules, mediator, policy and rule."""
 
-    Attributes:
-        rule: record of the update rule, whose type selects the code (`hose_learning.rules`).
-        columns, strides, bases: what the value modules see (`hose_learning.modules.Arrays`).
-        rewards: theirs (2^n_events, 2, n_modules), see `modules.make_module_rewards`.
-        thresholds: a module vetoes values below it; -inf for none (n_modules,).
-        has_thresholds: whether any module has one.
-        veto_columns, veto_strides, veto_bases: what the veto modules see.
-        veto_events, veto_actions: the events that each answers to, the actions that it is about
-            (n_vetoes,).
-        shares_vetoes: whether an event vetoes the last move of every agent of the cycle.
-        return_of_event: sum of all signals by events, each counted once (2^n_events,).
-        mediator, policy: numbers of `hose_learning.mediators` and `hose_learning.policies`.
-        fallback: action where everything is vetoed, or -1 for any.
-        learning_rate: alpha, and by how much it decays: alpha / (1 + decay moves).
-        learning_rate_decay: see there.
-        per_episode, per_success: what epsilon falls by at the end of an episode, and if it
-            succeeded.
-        least_epsilon: what it does not fall below.
-        temperature_factor: temperature of the soft max over epsilon.
-    """
-
-    rule: Any
+    rule: Any  # record of the update rule, whose type selects the code (`hose_learning.rules`)
+    # columns, strides, bases: what the value modules see (`hose_learning.modules.Arrays`).
     columns: Integers
     strides: Integers
     bases: Integers
-    rewards: Floats
-    thresholds: Floats
-    has_thresholds: bool
+    rewards: Floats  # theirs (2^n_events, 2, n_modules), see `modules.make_module_rewards`
+    thresholds: Floats  # a module vetoes values below it; -inf for none (n_modules,)
+    has_thresholds: bool  # whether any module has one
+    # veto_columns, veto_strides, veto_bases: what the veto modules see.
     veto_columns: Integers
     veto_strides: Integers
     veto_bases: Integers
+    # veto_events, veto_actions: the events that each answers to, the actions that it is about
+    # (n_vetoes,).
     veto_events: Integers
     veto_actions: Integers
-    shares_vetoes: bool
-    return_of_event: Floats
+    shares_vetoes: bool  # whether an event vetoes the last move of every agent of the cycle
+    return_of_event: Floats  # sum of all signals by events, each counted once (2^n_events,)
+    # mediator, policy: numbers of `hose_learning.mediators` and `hose_learning.policies`.
     mediator: int
     policy: int
-    fallback: int
-    learning_rate: float
-    learning_rate_decay: float
+    fallback: int  # action where everything is vetoed, or -1 for any
+    learning_rate: float  # alpha, and by how much it decays: alpha / (1 + decay moves)
+    learning_rate_decay: float  # see there
+    # per_episode, per_success: what epsilon falls by at the end of an episode, and if it succeeded.
     per_episode: float
     per_success: float
-    least_epsilon: float
-    temperature_factor: float
+    least_epsilon: float  # what it does not fall below
+    temperature_factor: float  # temperature of the soft max over epsilon
 
 
 class Memory(NamedTuple):
-    """What a learner has learned, and where it stands; all of it is saved with it.
+    """What a learner has learned, and where it stands; all of it is saved with it."""
 
-    Attributes:
-        table: Q-values of all value modules (rows of n_actions, or what the rule says).
-        vetoes: vetoed actions as bits of all veto modules (rows of 1).
-        state: the task's state.
-        values: the variables last observed (n_variables,).
-        scores: of the actions, what the choice goes by (n_actions,).
-        keys, veto_keys: what each agent's modules last saw (n_agents, n_modules).
-        last_keys, last_veto_keys: what they saw at its last move.
-        actions: each agent's last action (n_agents,).
-        allowed: what each agent may do, as bits (n_agents,).
-        rewards: what each agent's modules got since its last move (n_agents, n_modules).
-        steps_since_action: moves since each agent's last one; -1 before its first (n_agents,).
-        caused_events: events that each agent caused in a joint move (n_agents,).
-        numbers, counters: see the constants of this file.
-        event_counts: how often each event has happened (n_events,).
-        stream: random numbers of the choices (1,).
-        starts: random numbers of the resets (1,).
-        own: what the rule keeps beside, a NamedTuple of arrays.
-    """
-
-    table: Table
-    vetoes: Table
-    state: Integers
-    values: Integers
-    scores: Floats
+    table: Table  # Q-values of all value modules (rows of n_actions, or what the rule says)
+    vetoes: Table  # vetoed actions as bits of all veto modules (rows of 1)
+    state: Integers  # the task's state
+    values: Integers  # the variables last observed (n_variables,)
+    scores: Floats  # of the actions, what the choice goes by (n_actions,)
+    # keys, veto_keys: what each agent's modules last saw (n_agents, n_modules).
     keys: Integers
     veto_keys: Integers
+    # last_keys, last_veto_keys: what they saw at its last move.
     last_keys: Integers
     last_veto_keys: Integers
-    actions: Integers
-    allowed: Integers
-    rewards: Floats
+    actions: Integers  # each agent's last action (n_agents,)
+    allowed: Integers  # what each agent may do, as bits (n_agents,)
+    rewards: Floats  # what each agent's modules got since its last move (n_agents, n_modules)
+    # Moves since each agent's last one; -1 before its first (n_agents,).
     steps_since_action: Integers
-    caused_events: Integers
+    caused_events: Integers  # events that each agent caused in a joint move (n_agents,)
+    # numbers, counters: see the constants of this file.
     numbers: Floats
     counters: Integers
-    event_counts: Integers
-    stream: npt.NDArray[np.uint64]
-    starts: npt.NDArray[np.uint64]
-    own: Any
+    event_counts: Integers  # how often each event has happened (n_events,)
+    stream: npt.NDArray[np.uint64]  # random numbers of the choices (1,)
+    starts: npt.NDArray[np.uint64]  # random numbers of the resets (1,)
+    own: Any  # what the rule keeps beside, a NamedTuple of arrays
 
 
 class Log(NamedTuple):
-    """One row for each episode, filled from the front; `used` is the number of rows written (1,).
+    """One row for each episode, filled from the front."""
 
-    They are moves and last events (capacity, N_LOGGED), and sums of all rewards (capacity,).
-    """
-
-    used: Integers
-    episodes: Integers
-    returns: Floats
+    used: Integers  # number of rows written (1,)
+    episodes: Integers  # moves and last events (capacity, N_LOGGED)
+    returns: Floats  # sums of all rewards (capacity,)
 
 
 def make_log(capacity: int) -> Log:

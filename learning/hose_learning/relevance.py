@@ -5,8 +5,6 @@ of every logged pair (s, a). What remains is what a veto module has to see: the 
 tell apart, the sooner it knows them all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,16 +31,12 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Relevance:
-    """What Algorithm 5.1 found of some variables and signals, in their order.
-
-    `relevant` says whether a variable matters for a signal (n_variables, n_signals); `n_seen`
-    counts logged moves with the signal's event (n_signals,).
-    """
+    """What Algorithm 5.1 found of some variables and signals, in their order."""
 
     variables: tuple[str, ...]
     signals: tuple[Signal, ...]
-    relevant: Bools
-    n_seen: Integers
+    relevant: Bools  # whether a variable matters for a signal (n_variables, n_signals)
+    n_seen: Integers  # logged moves with the signal's event (n_signals,)
 
     def list_relevant(self, signal: Signal) -> tuple[str, ...]:
         """Returns the variables that matter for one of the signals."""

@@ -16,8 +16,6 @@ Before a choice it asks `mask` and `score`, which have defaults.
 When agents move at once it calls `choose_joint` and `learn_joint`.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from hose_learning.mediators import mediate

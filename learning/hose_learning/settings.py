@@ -1,7 +1,5 @@
 """All settings of a learner as data: what a run is identified by."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -17,25 +15,18 @@ FALLBACKS = ("none", "any")
 class Exploration:
     """How much is left to chance, and how that falls.
 
-    Attributes:
-        epsilon: at the start.
-        least: what it does not fall below.
-        per_episode: what it falls by after each episode.
-        per_success: what it falls by after each episode that reached the goal.
-        policy: "epsilon-greedy" (eq. 3.6) or "soft-max" (eq. 3.5) at a temperature of
-            `temperature_factor` times epsilon.
-        temperature_factor: see there.
-
     Raises:
         InputError: a value outside its range.
     """
 
-    epsilon: float = 1.0
-    least: float = 0.0
-    per_episode: float = 0.0
-    per_success: float = 0.0
+    epsilon: float = 1.0  # at the start
+    least: float = 0.0  # what it does not fall below
+    per_episode: float = 0.0  # what it falls by after each episode
+    per_success: float = 0.0  # what it falls by after each episode that reached the goal
+    # "epsilon-greedy" (eq. 3.6) or "soft-max" (eq. 3.5) at a temperature of `temperature_factor`
+    # times epsilon.
     policy: str = "epsilon-greedy"
-    temperature_factor: float = 10.0
+    temperature_factor: float = 10.0  # see there
 
     def __post_init__(self) -> None:
         check_range("epsilon", self.epsilon, 0.0, 1.0)
@@ -48,35 +39,22 @@ class Exploration:
 
 @dataclass(frozen=True, kw_only=True)
 class LearnerSettings:
-    """A learner as data.
+    """A learner as data; `InputError` for a value outside its range."""
 
-    Attributes:
-        modules: what it sees and learns from; at least one value module.
-        discount: gamma.
-        learning_rate: alpha at the start.
-        learning_rate_decay: alpha / (1 + decay moves).
-        exploration: epsilon and how it falls.
-        mediator: how several value modules agree, a key of `mediators.MEDIATORS`.
-        share_vetoes: whether a broken constraint vetoes the last move of every agent of the cycle,
-            and not of the mover alone.
-        fallback: what is done where everything is vetoed: the action "none" where there is one, or
-            "any".
-        hashed: whether tables are hashed; None for what fits.
-        options: what only this learner's rule knows (see its file).
-
-    Raises:
-        InputError: a value outside its range.
-    """
-
-    modules: tuple[Module, ...]
-    discount: float = 0.9
-    learning_rate: float = 0.25
-    learning_rate_decay: float = 0.0
-    exploration: Exploration = field(default_factory=Exploration)
+    modules: tuple[Module, ...]  # what it sees and learns from; at least one value module
+    discount: float = 0.9  # gamma
+    learning_rate: float = 0.25  # alpha at the start
+    learning_rate_decay: float = 0.0  # alpha / (1 + decay moves)
+    exploration: Exploration = field(default_factory=Exploration)  # epsilon and how it falls
+    # How several value modules agree, a key of `mediators.MEDIATORS`.
     mediator: str = "greatest-mass"
+    # Whether a broken constraint vetoes the last move of every agent of the cycle, and not of the
+    # mover alone.
     share_vetoes: bool = False
+    # What is done where everything is vetoed: the action "none" where there is one, or "any".
     fallback: str = "none"
-    hashed: bool | None = None
+    hashed: bool | None = None  # whether tables are hashed; None for what fits
+    # What only this learner's rule knows (see its file).
     options: Mapping[str, float | str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

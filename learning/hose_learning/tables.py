@@ -5,8 +5,6 @@ addressing with linear probing; what was never written reads as zeros. `grow` do
 loops stop before it is full and leave that to their caller.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,27 +15,20 @@ from hose_mj.tasks.kernels import Integers
 
 LARGEST_DENSE = 2**21
 """Most rows of a dense table; above that, visited rows side by side beat rows in their places."""
-DENSE_WIDTH = 8
-"""Longest rows of which there may be so many; of longer ones there may be fewer."""
+DENSE_WIDTH = 8  # longest rows of which there may be so many; of longer ones there may be fewer
 FIRST_CAPACITY = 2**14
-SLOTS_PER_KEY = 2
-"""Slots for each key at least; with fewer the probes grow long."""
+SLOTS_PER_KEY = 2  # slots for each key at least; with fewer the probes grow long
 _FREE = 0
 
 
 class Table(NamedTuple):
-    """Rows by key.
+    """Rows by key."""
 
-    Attributes:
-        keys: key + 1 of each slot, 0 where it is free (capacity,), a power of two; none at all in a
-            dense table, whose keys are its rows.
-        used: number of slots taken (1,).
-        rows: the rows (capacity + 1, width); the last one is zero and stands for all absent keys.
-    """
-
+    # Key + 1 of each slot, 0 where it is free (capacity,), a power of two; none at all in a dense
+    # table, whose keys are its rows.
     keys: Integers
-    used: Integers
-    rows: Any
+    used: Integers  # number of slots taken (1,)
+    rows: Any  # the rows (capacity + 1, width); the last one is zero and stands for all absent keys
 
 
 def make_table(size: int, width: int, dtype: npt.DTypeLike, hashed: bool | None = None) -> Table:

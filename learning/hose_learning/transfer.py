@@ -9,8 +9,6 @@ A table's row is copied to the rows of all those states. What was never written 
 the source and in the target alike, so only written rows have to be copied, in hashed tables too.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
@@ -30,27 +28,19 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-LARGEST = 2**24
-"""Most rows that a table may be given."""
+LARGEST = 2**24  # most rows that a table may be given
 
 
 @dataclass(frozen=True)
 class Image:
-    """Where the keys of one module of the source lie in that of the target.
+    """Where the keys of one module of the source lie in that of the target."""
 
-    Attributes:
-        strides: of each source variable in the source's key (k,).
-        cardinalities: of these variables (k,).
-        images: what a step of each adds to the target's key (k,).
-        offsets: what each combination of the variables that only the target sees adds to it (n,).
-        size: number of the source's keys.
-    """
-
-    strides: Integers
-    cardinalities: Integers
-    images: Integers
+    strides: Integers  # of each source variable in the source's key (k,)
+    cardinalities: Integers  # of these variables (k,)
+    images: Integers  # what a step of each adds to the target's key (k,)
+    # What each combination of the variables that only the target sees adds to it (n,).
     offsets: Integers
-    size: int
+    size: int  # number of the source's keys
 
     def map(self, keys: Integers) -> Integers:
         """Returns all keys of the target that are projected onto each of the source's (n_keys, n).
@@ -58,8 +48,7 @@ class Image:
         [s] = key of the source; its digits in mixed radix are the values of the shared variables.
         """
         digits = keys[:, None] // self.strides % self.cardinalities
-        mapped: Integers = (digits @ self.images)[:, None] + self.offsets
-        return mapped
+        return (digits @ self.images)[:, None] + self.offsets
 
 
 def make_image(source: Task, source_module: Module, target: Task, target_module: Module) -> Image:
@@ -100,16 +89,12 @@ def make_image(source: Task, source_module: Module, target: Task, target_module:
 
 @dataclass(frozen=True)
 class Match:
-    """A module that source and target have in common.
-
-    `table` is the field of the memory that holds its rows, `image` how its keys relate, `parts` the
-    first key of each agent in the source and in the target.
-    """
+    """A module that source and target have in common."""
 
     name: str
-    table: str
-    image: Image
-    parts: tuple[tuple[int, int], ...]
+    table: str  # field of the memory that holds its rows
+    image: Image  # how its keys relate
+    parts: tuple[tuple[int, int], ...]  # first key of each agent in source and target
 
 
 def transfer(source: Training, target: Training) -> tuple[str, ...]:
@@ -215,56 +200,41 @@ def list_written(table: Table) -> tuple[Integers, Integers]:
 
 
 LEARNER = "d-rr-ql"
-PER_SUCCESS = 0.001
-"""What epsilon falls by with each goal reached on the source (section 4.6.1)."""
+PER_SUCCESS = 0.001  # what epsilon falls by with each goal reached on the source (section 4.6.1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TransferPlan:
-    """What to run.
+    """What to run."""
 
-    Attributes:
-        source, target: ids of the tasks.
-        source_options, target_options: their options.
-        moves: of training on the source.
-        episodes: greedy learning episodes on the target.
-        exchange: what a move on the target costs, in moves on the source; a control for each.
-        values: what the goal modules see (`hose_learning.presets.VALUES`).
-    """
-
+    # source, target: ids of the tasks.
     source: str
     target: str
+    # source_options, target_options: their options.
     source_options: Mapping[str, Any]
     target_options: Mapping[str, Any]
-    moves: int
-    episodes: int
+    moves: int  # of training on the source
+    episodes: int  # greedy learning episodes on the target
+    # What a move on the target costs, in moves on the source; a control for each.
     exchange: tuple[float, ...]
-    values: str = "goal"
+    values: str = "goal"  # what the goal modules see (`hose_learning.presets.VALUES`)
 
 
 @dataclass(frozen=True)
 class TransferOutcome:
-    """What came of one configuration.
+    """What came of one configuration."""
 
-    Attributes:
-        modules: names of the modules transferred.
-        reached: whether each greedy episode on the target reached its goal.
-        moves: of single agents in these episodes.
-        source_reached: whether the greedy policy reaches the goal on the source itself.
-        controls: for each exchange rate the moves explored, and whether they reached the goal.
-        vetoes_before, vetoes_after: vetoed actions in the target's tables, before and after its
-            episodes.
-        vetoes_lost: those of before that are not there after.
-    """
-
-    modules: tuple[str, ...]
-    reached: tuple[bool, ...]
-    moves: int
-    source_reached: bool
+    modules: tuple[str, ...]  # names of the modules transferred
+    reached: tuple[bool, ...]  # whether each greedy episode on the target reached its goal
+    moves: int  # of single agents in these episodes
+    source_reached: bool  # whether the greedy policy reaches the goal on the source itself
+    # For each exchange rate the moves explored, and whether they reached the goal.
     controls: tuple[tuple[int, bool], ...]
+    # vetoes_before, vetoes_after: vetoed actions in the target's tables, before and after its
+    # episodes.
     vetoes_before: int
     vetoes_after: int
-    vetoes_lost: int
+    vetoes_lost: int  # those of before that are not there after
 
 
 def run_trial(plan: TransferPlan, generator: np.random.Generator) -> TransferOutcome:

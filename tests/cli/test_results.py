@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from hose_mj.checks import Check
-from hose_mj.cli.results import check_choice, check_counts, finish, make_folder, print_table
+from hose_mj.cli.results import check_counts, finish, make_folder, print_table
 from hose_mj.errors import InputError
 
 
@@ -25,12 +25,6 @@ def test_numbers_have_a_least_one_and_none_is_no_number():
     check_counts(Args(), seed=3, moves=1)
     with pytest.raises(InputError, match="seed is 3; valid: a whole number, at least 4"):
         check_counts(Args(), seed=4)
-
-
-def test_a_choice_is_one_of_the_known():
-    check_choice("model", "geds", {"geds": 1, "flex": 2})
-    with pytest.raises(InputError, match="model is 'gedz'; valid: one of geds, flex"):
-        check_choice("model", "gedz", iter(("geds", "flex")))
 
 
 def test_a_folder_is_made_or_refused(tmp_path):

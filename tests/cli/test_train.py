@@ -27,7 +27,7 @@ def uncompiled(monkeypatch):
         def __init__(self, *arguments, **options):
             super().__init__(*arguments, **{**options, "compiled": False})
 
-    monkeypatch.setattr(train, "Training", Plain)
+    monkeypatch.setattr("hose_learning.study.training.Training", Plain)
     monkeypatch.setattr("hose_learning.study.run_folder.Training", Plain)
     monkeypatch.setattr(train, "_compile", lambda training: None)
 

@@ -10,6 +10,7 @@ import pytest
 from hose_mj.constraints.kinds import KIND_OF
 from hose_mj.constraints.limits import Limits
 from hose_mj.constraints.monitor import Monitor
+from hose_mj.errors import InputError
 
 DISC, HOSE, NEAR = 0.02, 0.008, 0.0008
 """Radii of the floor's pucks and hose (m), and how near the hose counts as run over."""
@@ -24,6 +25,14 @@ def advance(world, monitor, move, steps):
         if found:
             return found
     return None
+
+
+def test_only_a_world_is_watched(floor):
+    for odd in (None, "floor_1", 3):
+        with pytest.raises(InputError, match=r"^world is .*; valid: a world, as make_world"):
+            Monitor(odd)
+    with pytest.raises(InputError, match=r"^limits is 3; valid: a Limits"):
+        Monitor(floor, 3)
 
 
 def test_names_say_what_is_measured(floor):

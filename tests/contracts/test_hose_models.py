@@ -417,6 +417,90 @@ def test_bad_call(hose, case):
     np.testing.assert_array_equal(observe(hose), before)
 
 
+ODD = [10**400, 10**5000, 1j, {"a": 1}, {1}, "text", np.zeros((2, 2)), np.array([1j] * 3), object()]
+ODD_CALLS = {
+    "clamp": lambda h, hold, odd: h.clamp(odd),
+    "clamp position": lambda h, hold, odd: h.clamp(0.5, odd),
+    "clamp tangent": lambda h, hold, odd: h.clamp(0.5, None, odd),
+    "attach": lambda h, hold, odd: h.attach(odd),
+    "attach position": lambda h, hold, odd: h.attach(0.5, odd),
+    "move": lambda h, hold, odd: h.move(odd, [0.0, 0.0, 1.0]),
+    "move position": lambda h, hold, odd: h.move(hold, odd),
+    "move entry": lambda h, hold, odd: h.move(hold, [odd, 0.0, 0.0]),
+    "move tangent": lambda h, hold, odd: h.move(hold, None, odd),
+    "move spin": lambda h, hold, odd: h.move(hold, spin=odd),
+    "release": lambda h, hold, odd: h.release(odd),
+    "reaction": lambda h, hold, odd: h.reaction(odd),
+    "force": lambda h, hold, odd: h.apply_force(0.5, odd),
+    "force place": lambda h, hold, odd: h.apply_force(odd, [0.0, 0.0, 1.0]),
+    "moment": lambda h, hold, odd: h.apply_moment(0.5, odd),
+    "position": lambda h, hold, odd: h.position(odd),
+    "torque": lambda h, hold, odd: h.torque(odd),
+    "curve": lambda h, hold, odd: h.reset(odd),
+    "curve function": lambda h, hold, odd: h.reset(lambda s: odd),
+    "velocity": lambda h, hold, odd: h.reset(arch, odd),
+    "velocity function": lambda h, hold, odd: h.reset(arch, lambda s: odd),
+    "steps": lambda h, hold, odd: h.step(odd),
+    "snapshot": lambda h, hold, odd: h.restore(odd),
+    "timestep": lambda h, hold, odd: type(h)(make_spec(), timestep=odd),
+    "gravity": lambda h, hold, odd: type(h)(make_spec(), timestep=1e-3, gravity=odd),
+    "model": lambda h, hold, odd: make_hose(odd, make_spec(), timestep=1e-3),
+}
+
+
+@pytest.mark.parametrize("case", ODD_CALLS)
+def test_what_is_no_number_no_vector_and_no_hold_is_refused(hose, case):
+    hose.reset(arch)
+    hold = hose.attach(0.25)
+    before = observe(hose)
+    for odd in ODD:
+        with pytest.raises(InputError):
+            ODD_CALLS[case](hose, hold, odd)
+    np.testing.assert_array_equal(observe(hose), before)
+    assert hose.reaction(hold).force.shape == (3,)
+
+
+def test_a_snapshot_of_which_a_part_is_missing_or_odd_changes_nothing(hose):
+    hose.reset(arch)
+    hose.attach(0.25)
+    before = observe(hose)
+    for name in hose.snapshot():
+        for odd in (None, "text", {"a": 1}):
+            with pytest.raises(InputError, match="state"):
+                hose.restore(hose.snapshot() | {name: odd})
+        state = hose.snapshot()
+        del state[name]
+        with pytest.raises(InputError, match="state"):
+            hose.restore(state)
+    np.testing.assert_array_equal(observe(hose), before)
+
+
+@pytest.mark.parametrize("size", [1e14, 1e160, 1e308])
+def test_absurd_numbers_are_refused_or_fail_and_leave_the_state_finite(hose, size):
+    calls = {
+        "place": lambda hold: hose.move(hold, [size, 0.0, 0.0]),
+        "velocity": lambda hold: hose.reset(arch, [[0.0, 0.0, size]] * 2),
+        "velocity function": lambda hold: hose.reset(arch, lambda s: np.full((len(s), 3), size)),
+        "force": lambda hold: hose.apply_force(0.5, [0.0, 0.0, size]),
+        "moment": lambda hold: hose.apply_moment(0.5, [0.0, size, 0.0]),
+    }
+    for name, call in calls.items():
+        hose.reset(arch)
+        hold = hose.attach(1.0)
+        try:
+            call(hold)
+            assert size < 1e15, name
+            hose.step(3)
+        except HoseError:
+            pass
+        assert np.isfinite(observe(hose)).all(), name
+
+
+def test_a_spec_that_is_none(model):
+    message = catch(lambda: make_hose(model, None, timestep=1e-3))
+    assert message.startswith("spec is None; valid: a HoseSpec")
+
+
 @pytest.mark.parametrize("timestep", [math.nan, -1e-3, 0.0, math.inf, "fast"])
 def test_bad_timestep(model, timestep):
     message = catch(lambda: make(model, timestep=timestep))

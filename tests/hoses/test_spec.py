@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import pickle
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
 from hose_mj.assets import find_assets
@@ -128,3 +129,41 @@ def test_what_no_float_holds_is_no_number():
 def test_fittings_are_a_tuple_of_fittings(fittings):
     with pytest.raises(InputError, match="valid: a tuple of Fitting"):
         replace(HoseSpec.ready("garden-hose-19mm", length=1.0), fittings=fittings)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64])
+def test_numbers_of_numpy_are_stored_as_floats(kind):
+    spec = HoseSpec(**{name: kind(3) for name in PLAIN})
+    assert spec == HoseSpec(**dict.fromkeys(PLAIN, 3.0))
+    assert all(type(getattr(spec, name)) is float for name in PLAIN)
+    assert type(Fitting(start=kind(0), end=kind(1)).end) is float
+    tube = HoseSpec.from_material(
+        length=1, youngs_modulus=kind(9), poisson_ratio=0, density=kind(9), outer_radius=kind(2)
+    )
+    assert type(tube.linear_density) is float
+
+
+ODD = [1j, {}, set(), "1", None, True, np.True_, np.ones(1), 10**5000]
+
+
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: type(odd).__name__)
+@pytest.mark.parametrize("name", PLAIN)
+def test_what_is_no_number_is_refused_by_name(name, odd):
+    with pytest.raises(InputError, match=f"^{name} is .*; valid: a finite number above 0"):
+        HoseSpec(**PLAIN | {name: odd})
+
+
+def test_a_default_gj_follows_ei_and_one_that_was_given_stays():
+    default, given = HoseSpec(**PLAIN), HoseSpec(**PLAIN, torsional_stiffness=5e-3 / 1.3)
+    assert default == given
+    assert hash(default) == hash(given)
+    assert repr(default) == repr(given)
+    assert asdict(default) == asdict(given)
+    for spec in (default, pickle.loads(pickle.dumps(default)), replace(default, length=1.0)):
+        stiff = replace(spec, bending_stiffness=1.3)
+        assert stiff.torsional_stiffness == 1.0
+        assert replace(stiff, bending_stiffness=2.6).torsional_stiffness == 2.0
+        own = replace(spec, bending_stiffness=1.3, torsional_stiffness=7.0)
+        assert replace(own, bending_stiffness=2.6).torsional_stiffness == 7.0
+    for spec in (given, pickle.loads(pickle.dumps(given)), HoseSpec(**asdict(default))):
+        assert replace(spec, bending_stiffness=1.3).torsional_stiffness == 5e-3 / 1.3

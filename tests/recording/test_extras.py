@@ -32,7 +32,7 @@ def test_data_files_documents_and_pages_need_no_extra():
     [
         ("import hose_mj.recording.rerun.viewer", "viewer"),
         ("import hose_mj.recording.plots.curves", "report"),
-        ("from hose_mj.recording.parquet import read_records; read_records('a.parquet')", "report"),
+        ("from hose_mj.recording.parquet import load_pyarrow; load_pyarrow()", "report"),
     ],
 )
 def test_what_lacks_an_extra_says_which_to_install(line, extra):

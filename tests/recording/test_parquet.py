@@ -1,16 +1,23 @@
 import csv
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 
 from hose_mj.errors import InputError
-from hose_mj.recording.parquet import read_records, write_records
+from hose_mj.recording.parquet import write_records
 
 RECORDS = [
     {"case": "tip-load", "resolution": 8, "error": 1, "clamp_corrected": None},
     {"case": "", "resolution": np.int64(16), "error": 0.1 + 0.2, "clamp_corrected": True},
     {"case": 'a "quoted", one', "error": np.float64(1e-300), "note": "µ\nline"},
 ]
+
+
+def read_records(path):
+    table = pyarrow.parquet.read_table(path)
+    kept = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
+    return table.to_pylist(), kept
 
 
 @pytest.fixture
@@ -66,10 +73,3 @@ def test_what_no_column_can_hold_is_refused(tmp_path, records, types):
     with pytest.raises(InputError):
         write_records(records, tmp_path / "a.parquet", types=types)
     assert not list(tmp_path.iterdir())
-
-
-def test_an_unreadable_file_is_named(tmp_path):
-    (tmp_path / "a.parquet").write_bytes(b"garbage")
-    for name in ("a.parquet", "absent.parquet"):
-        with pytest.raises(InputError, match=name):
-            read_records(tmp_path / name)

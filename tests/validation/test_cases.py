@@ -310,14 +310,15 @@ def test_cases_of_other_packages_are_found_by_id_and_family(plug_in):
 
 
 @pytest.mark.parametrize(("names", "what"), [(["list_nonsense"], "Case"), (["missing"], "missing")])
-def test_a_plugin_that_is_no_case_is_one_error(plug_in, names, what):
-    plug_in(*names)
-    with pytest.raises(InputError, match=what):
+def test_a_plugin_that_is_no_case_is_left_out(plug_in, names, what):
+    plug_in(*names, "list_some")
+    with pytest.warns(RuntimeWarning, match=what), pytest.raises(InputError, match="my-load"):
         find_cases(("my-load",))
+    assert len(find_cases(("mine",))) == 2
 
 
 def test_an_id_that_is_taken(plug_in):
     plug_in("ONE", "list_some")
     cases.find_plugins(None)["again"] = EntryPoint("again", "my_plugin:ONE", "hose_mj.cases")
-    with pytest.raises(InputError, match="my-load"):
-        find_cases(("mine",))
+    with pytest.warns(RuntimeWarning, match="again is left out: id of a case .* 'my-load'"):
+        assert len(find_cases(("mine", "my-load"))) == 3

@@ -235,8 +235,47 @@ def test_mistakes_are_named_and_change_nothing():
     for options in ({"scheme": "verlet"}, {"scheme": "euler"}, {"timestep": 0.0}):
         with pytest.raises(InputError, match=next(iter(options))):
             make_world("floor_2", **options)
+    with pytest.raises(InputError, match="option of geds is 'colour'; valid: one of timestep"):
+        make_world("floor_2", colour=3)
     with pytest.raises(InputError, match=r"model is .rope"):
         make_world("floor_2", "rope")
+
+
+ODD = [10**400, 1j, {"a": 1}, "text", np.zeros((2, 2)), object()]
+
+
+@pytest.mark.parametrize("model", ["geds", "flex"])
+def test_what_is_no_number_and_no_scene_is_refused(model):
+    world = make_world("floor_2", model)
+    before = world.snapshot()
+    for odd in ODD:
+        for call in (
+            lambda odd=odd: make_world("floor_2", model, timestep=odd),
+            lambda odd=odd: world.step(odd),
+            lambda odd=odd: world.hose_position(odd),
+            lambda odd=odd: world.tension(odd),
+            lambda odd=odd: world.apply_force(0, odd),
+            lambda odd=odd: world.apply_force(0, [odd, 0.0, 0.0]),
+            lambda odd=odd: world.apply_force(odd, [0.0, 0.0, 0.0]),
+            lambda odd=odd: world.restore(odd),
+            lambda odd=odd: world.restore(before | {"hose": odd}),
+        ):
+            with pytest.raises(InputError):
+                call()
+    with pytest.raises(InputError, match=r"force is .*each at most 1e\+15"):
+        world.apply_force(0, [1e160, 0.0, 0.0])
+    world.control[0] = 1e160
+    with pytest.raises(InputError, match=r"control is .*each at most 1e\+15"):
+        world.step()
+    world.control[0] = 0.0
+    np.testing.assert_array_equal(world.snapshot()["mujoco"], before["mujoco"])
+    for scene in (None, 3):
+        with pytest.raises(
+            InputError, match=r"^scene is .*; valid: the name of a scene, or an MJC"
+        ):
+            make_world(scene, model)
+    with pytest.raises(InputError, match=r"^scene is None; valid: a Scene"):
+        type(world)(None)
 
 
 def test_names_of_the_release_before_go_on_and_say_the_new_one():

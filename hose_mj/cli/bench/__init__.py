@@ -15,7 +15,8 @@ from typing import Annotated
 import tyro
 
 from hose_mj.checks import Check
-from hose_mj.cli.results import check_choice, check_counts, finish, print_table
+from hose_mj.cli.results import check_counts, finish, print_table
+from hose_mj.errors import check_choice
 
 GROUPS = {
     "env": "hose_mj.cli.bench.env",
@@ -36,33 +37,22 @@ class Args:
 
     group: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="{env,hose,learn,world}")]
     """What to measure."""
-    quick: bool = False
-    """Fewer and shorter rounds."""
-    json: bool = False
-    """Print one JSON document on stdout; messages go to stderr."""
-    seed: int = 0
-    """Seed of the actions and states."""
+    quick: bool = False  # Fewer and shorter rounds.
+    json: bool = False  # Print one JSON document on stdout; messages go to stderr.
+    seed: int = 0  # Seed of the actions and states.
 
 
 @dataclass(frozen=True)
 class Record:
-    """One measured number.
+    """One measured number."""
 
-    Attributes:
-        group: the group it belongs to.
-        name: what was measured; unique in its group.
-        value: the number.
-        unit: its unit.
-        peer: what it is compared with, the name of another record; None without one.
-        ratio: how many times faster than the peer; None without one.
-    """
-
-    group: str
-    name: str
-    value: float
-    unit: str
+    group: str  # the group it belongs to
+    name: str  # what was measured; unique in its group
+    value: float  # the number
+    unit: str  # its unit
+    # What it is compared with, the name of another record; None without one.
     peer: str | None = None
-    ratio: float | None = None
+    ratio: float | None = None  # how many times faster than the peer; None without one
 
 
 @dataclass

@@ -18,8 +18,7 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 
 N_ROBOTS = (2, 3, 4, 6, 8)
-MAIN = 4
-"""The number of robots that the limits are about."""
+MAIN = 4  # the number of robots that the limits are about
 COPIES = 1024
 PEER = "Gymnasium's Taxi from Python"
 LEAST_MOVES, LEAST_RATIO, LEAST_VECTOR_MOVES = 3e6, 100.0, 1e6

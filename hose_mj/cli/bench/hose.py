@@ -9,8 +9,7 @@ from hose_mj.hoses.protocol import HoseModel
 from hose_mj.hoses.registry import make_hose
 from hose_mj.hoses.spec import HoseSpec
 
-SIZES = (8, 16, 32, 64)
-"""Control points, or segments."""
+SIZES = (8, 16, 32, 64)  # control points, or segments
 TIMESTEP = {"geds": 5e-3, "cable": 2e-3}
 """The cable's explicit elastic forces want a smaller step (s)."""
 LENGTH = 1.0

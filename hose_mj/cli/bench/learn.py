@@ -25,8 +25,7 @@ LEAST_RATIO, MOST_SECONDS = 100.0, 10.0
 """Limits: moves/s by number of robots, times faster than plain Python, seconds for 1e7 moves."""
 MAIN = 3
 TEST_EVERY = 100
-BLOCK = 200
-"""Episodes that are timed at once, their tests included."""
+BLOCK = 200  # episodes that are timed at once, their tests included
 PLAIN_MOVES = 20_000
 _STARTS = {
     2: (((3, 2), (2, 0)), (5, 5)),

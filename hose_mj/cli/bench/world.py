@@ -26,16 +26,11 @@ from hose_mj.world.registry import make_world
 from hose_mj.world.world import World
 
 PEER = "cable, 40 segments"
-LEAST_RATIO = 20.0
-"""Limit: how many times as many simulated seconds a second as the cable."""
-MOST_RECORDING = 0.05
-"""Limit: what recording adds to the processor time of a rollout's thread."""
-_DURATION = 20.0
-"""Simulated seconds of a rollout."""
-_TOW = 0.2
-"""Speed at which the robots tow the hose (m/s), round a circle."""
-_RADIUS = 0.04
-"""Of the circle (m)."""
+LEAST_RATIO = 20.0  # limit: how many times as many simulated seconds a second as the cable
+MOST_RECORDING = 0.05  # limit: what recording adds to the processor time of a rollout's thread
+_DURATION = 20.0  # simulated seconds of a rollout
+_TOW = 0.2  # speed at which the robots tow the hose (m/s), round a circle
+_RADIUS = 0.04  # of the circle (m)
 
 
 def measure(quick: bool, seed: int) -> Bench:

@@ -8,12 +8,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, energy, frames, integrators, mechanics
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import check_arc_lengths, check_vector, sample_curve, sample_velocity
+from hose_mj.hoses.inputs import (
+    check_arc_lengths,
+    check_rows,
+    check_vector,
+    sample_curve,
+    sample_velocity,
+)
 from hose_mj.hoses.protocol import Array, Curve, Energies, Momentum
 from hose_mj.hoses.spec import HoseSpec
 
@@ -168,14 +173,7 @@ class SplineBody:
 
     def _set_points(self, points: ArrayLike) -> None:
         """Makes the state anew from control points (n, 3), at rest."""
-        shape = (self._spline.n_control_points, 3)
-        try:
-            wanted = np.asarray(points, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError("control points", points, f"finite numbers, shape {shape}") from None
-        if wanted.shape != shape or not np.all(np.isfinite(wanted)):
-            valid = f"shape {shape}, all finite"
-            raise InputError("shape of the control points", wanted.shape, valid)
+        wanted = check_rows("the control points", points, self._spline.n_control_points)
         self._spline.offset = self._spline.compute_offset(wanted)
         state = integrators.make_state(self._spline.size)
         state.x[:] = self._spline.from_world(wanted)

@@ -23,7 +23,7 @@ from hose_mj.hoses.geds.frames import transport_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
-from hose_mj.hoses.inputs import check_vector
+from hose_mj.hoses.inputs import check_records, check_vector, read_numbers
 from hose_mj.hoses.protocol import Array, Hold, Reaction
 from hose_mj.hoses.spec import check_number
 
@@ -216,18 +216,20 @@ class ConstraintSet:
         Raises:
             InputError: a clamp, a hold that is not here, wrong shapes, numbers that are not finite.
         """
-        if list(holds) != self._compliant:
-            for hold in holds:
+        given = list(check_records("holds", holds, Hold))
+        if given != self._compliant:
+            for hold in given:
                 if self._find(hold).tangent is not None:
                     raise InputError("hold", hold, "an attachment: a clamp on a body gives no way")
-            self._compliant = list(holds)
-            self._compliant_first = np.array([self._find(h).first for h in holds], dtype=np.int64)
+            self._compliant = given
+            self._compliant_first = np.array([self._find(h).first for h in given], dtype=np.int64)
             d = self._spline.dimension
             self._compliant_rows = (self._compliant_first[:, None] + np.arange(d)).ravel()
             self.rows = self.rows._replace(response=records.make_response(len(self.rows.start)))
         if positions is not None:
             k, dims = len(holds), self._spline.dims
-            places, matrix = np.asarray(positions, float), np.asarray(compliance, float)
+            places = read_numbers("positions", positions, "finite numbers", np.inf)
+            matrix = read_numbers("compliance", compliance, "finite numbers", np.inf)
             if places.shape != (k, 3) or matrix.shape != (3 * k, 3 * k):
                 valid = f"({k}, 3) and ({3 * k}, {3 * k})"
                 shapes = (places.shape, matrix.shape)
@@ -359,9 +361,10 @@ class ConstraintSet:
     # -- inside --------------------------------------------------------------------------------
 
     def _find(self, hold: Hold) -> _Held:
-        for held in self._held:
-            if held.hold == hold:
-                return held
+        if isinstance(hold, Hold):
+            for held in self._held:
+                if held.hold == hold:
+                    return held
         raise InputError("hold", hold, "a hold of this hose that was not released")
 
     def _across(self, tangent: Array) -> Array:

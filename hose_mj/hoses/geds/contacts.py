@@ -13,7 +13,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis, contact, contact_law, shapes
 from hose_mj.hoses.geds.integrators import State
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.inputs import check_count, check_records, read_numbers
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec, check_number
@@ -96,10 +96,9 @@ class ContactSet:
             InputError: something that is not an obstacle; the explicit scheme.
         """
         self._check_implicit()
-        for obstacle in obstacles:
-            if not isinstance(obstacle, Obstacle):
-                raise InputError("obstacles", obstacle, "records of the class Obstacle")
-        self._set(obstacles, law or ContactLaw())
+        if law is not None and not isinstance(law, ContactLaw):
+            raise InputError("law", law, "a ContactLaw or None")
+        self._set(check_records("obstacles", obstacles, Obstacle), law or ContactLaw())
 
     def add_floor(self, height: float = 0.0, friction: float = 0.5) -> int:
         """Adds a horizontal floor below the hose at z = height (m); returns its number."""
@@ -176,16 +175,18 @@ class ContactSet:
         q = 0 if distances is None else len(self.arc_lengths)
         given = np.zeros((q, contact_law.GIVEN))
         if distances is not None:
-            turned = np.asarray(normals, dtype=np.float64)
-            speeds = np.asarray(velocities, dtype=np.float64)
+            gaps = read_numbers("distances", distances, "finite numbers (m)")
+            turned = read_numbers("normals", normals, "finite numbers")
+            speeds = read_numbers("velocities", velocities, "finite numbers (m/s)")
+            rough = read_numbers("friction", friction, "finite numbers at or above 0")
             try:
-                given[:, 0] = distances
+                given[:, 0] = gaps
                 given[:, 1:4] = turned[..., self.order]
-                given[:, 4] = friction
+                given[:, 4] = rough
                 given[:, 5:8] = speeds[..., self.order]
-            except (TypeError, ValueError, IndexError):
+            except (ValueError, IndexError):
                 valid = f"distances ({q},), normals and velocities ({q}, 3), friction ({q},)"
-                raise InputError("shapes of the distances", np.shape(distances), valid) from None
+                raise InputError("shapes of the distances", gaps.shape, valid) from None
             if not np.all(np.isfinite(given)) or np.any(given[:, 4] < 0.0):
                 raise InputError("distances", distances, "finite numbers, friction at or above 0")
             place = self._spline.evaluate(self.arc_lengths, self._state.x)
@@ -214,8 +215,8 @@ class ContactSet:
             InputError: a wrong shape or a value outside its range; the explicit scheme.
         """
         self._check_implicit()
-        places = np.asarray(points, dtype=np.float64)
-        speeds = np.asarray(velocities, dtype=np.float64)
+        places = read_numbers("neighbour", points, "finite places (m)")
+        speeds = read_numbers("velocities of the neighbour", velocities, "finite numbers (m/s)")
         if places.ndim != 2 or places.shape[1:] != (3,) or len(places) < 2:
             raise InputError("shape of the neighbour", places.shape, "(m + 1, 3) with m >= 1")
         if speeds.shape != places.shape:
@@ -263,7 +264,7 @@ class ContactSet:
         Raises:
             InputError: points that are not finite or of another shape.
         """
-        places = np.asarray(points, dtype=np.float64)
+        places = read_numbers("points", points, "finite numbers, shape (k, 3)")
         if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
             raise InputError("points", places.shape, "finite numbers, shape (k, 3)")
         local = np.ascontiguousarray((places - self._spline.offset)[:, self.order])

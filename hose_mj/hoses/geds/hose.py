@@ -23,10 +23,16 @@ from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import check_count, check_vector
+from hose_mj.hoses.inputs import (
+    check_count,
+    check_records,
+    check_rows,
+    check_vector,
+    restore_snapshot,
+)
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import Array, Curve, Hold, Linearization, Reaction
-from hose_mj.hoses.spec import HoseSpec, check_number
+from hose_mj.hoses.spec import HoseSpec, check_number, check_spec
 
 _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
@@ -94,6 +100,7 @@ class GedsHose(SplineBody):
         obstacles: Sequence[Obstacle] = (),
         contact_law: ContactLaw | None = None,
     ) -> None:
+        check_spec(spec)
         check_number("timestep", timestep)
         check_number("tolerance", tolerance)
         check_number("force_tolerance", force_tolerance)
@@ -116,7 +123,7 @@ class GedsHose(SplineBody):
             *(scheme, float(timestep), self._state, self._counts),
         )
         self.coupling = BodyCoupling(self._dynamics)
-        if len(obstacles) > 0:
+        if check_records("obstacles", obstacles, Obstacle):
             self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
 
@@ -194,8 +201,12 @@ class GedsHose(SplineBody):
         """Returns to a snapshot of this hose, or of one with as many control points and unknowns.
 
         Raises:
-            InputError: a snapshot of a hose with another number of unknowns.
+            InputError: a snapshot of a hose with another number of unknowns, or what is none.
+                Nothing changed then.
         """
+        restore_snapshot(state, self.snapshot(), self._restore)
+
+    def _restore(self, state: dict[str, Any]) -> None:
         size = len(state["state"]["x"])
         if size != self._spline.size:
             valid = f"{self._spline.size}, as in this hose"
@@ -365,10 +376,7 @@ class GedsHose(SplineBody):
         Raises:
             InputError: a wrong shape or a number that is not finite.
         """
-        wanted = np.asarray(acceleration, dtype=np.float64)
-        n = self._spline.n_control_points
-        if wanted.shape != (n, 3) or not np.all(np.isfinite(wanted)):
-            raise InputError("acceleration", wanted.shape, f"finite numbers, shape ({n}, 3)")
+        wanted = check_rows("acceleration", acceleration, self._spline.n_control_points)
         work = self._dynamics.build_tangent()
         drag = self._hose.drag_rate * self._state.v
         inertia = self._multiply_mass(self._spline.from_world(wanted) + drag)

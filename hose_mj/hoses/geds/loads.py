@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
 from hose_mj.hoses.geds import records
 from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import check_arc_lengths, check_vector
+from hose_mj.hoses.inputs import check_arc_lengths, check_rows, check_vector
 from hose_mj.hoses.protocol import Array
 
 
@@ -53,9 +52,7 @@ class LoadSet:
             InputError: places off the hose, forces that are not finite or of another shape.
         """
         places = check_arc_lengths(arc_lengths, self._spline.length)
-        vectors = np.asarray(forces, dtype=np.float64)
-        if vectors.shape != (len(places), 3) or not np.all(np.isfinite(vectors)):
-            raise InputError("forces", vectors.shape, f"finite numbers, shape ({len(places)}, 3)")
+        vectors = check_rows("forces", forces, len(places))
         self._push = self._spline.from_world(self._spline.compute_jacobian(places) @ vectors)
         self._rebuild()
 

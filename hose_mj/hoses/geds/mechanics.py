@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, check_choice
 from hose_mj.hoses.geds import basis, integrators, newton, records
 from hose_mj.hoses.geds.frenet import SMALLEST_BEND
 from hose_mj.hoses.geds.span import Elasticity
@@ -24,7 +24,9 @@ from hose_mj.jit import compile_notice
 
 def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
     """Returns True for a hose with theta; raises `InputError` for a form that cannot do it."""
-    if form not in (None, "scalar", "theta", "frenet"):
+    if form is not None and (
+        not isinstance(form, str) or form not in ("scalar", "theta", "frenet")
+    ):
         raise InputError("twist", form, "None, scalar, theta, frenet")
     if plane is not None:
         if form is not None:
@@ -40,10 +42,9 @@ def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
 
 def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool) -> None:
     """Raises `InputError` for an unknown scheme, or one that cannot do what the hose needs."""
+    check_choice("scheme", scheme, integrators.SCHEMES)
     if scheme == "verlet" and has_theta:
         raise InputError("scheme", scheme, "an implicit scheme for a hose with theta")
-    if scheme not in integrators.SCHEMES:
-        raise InputError("scheme", scheme, "one of " + ", ".join(integrators.SCHEMES))
     if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0):
         raise InputError("scheme", scheme, "an implicit scheme for a hose with damping or drag")
 

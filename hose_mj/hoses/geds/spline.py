@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
 from hose_mj.hoses.geds import basis
-from hose_mj.hoses.inputs import check_arc_lengths, check_count, check_vector
+from hose_mj.hoses.inputs import check_count, check_place, check_vector
 from hose_mj.hoses.protocol import Array
 
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -50,7 +50,7 @@ class Spline:
         n = check_count(
             "control_points", n_control_points, FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS
         )
-        if plane is not None and plane not in PLANES:
+        if plane is not None and (not isinstance(plane, str) or plane not in PLANES):
             raise InputError("plane", plane, f"None, {', '.join(PLANES)}")
         self.n_control_points = n
         self.length = length
@@ -171,10 +171,7 @@ class Spline:
 
     def check_place(self, arc_length: float) -> float:
         """Returns one arc length; raises `InputError` unless it is one number on the hose."""
-        places = check_arc_lengths(arc_length, self.length)
-        if len(places) != 1:
-            raise InputError("arc_length", arc_length, f"one number, 0 to {self.length} m")
-        return float(places[0])
+        return check_place(arc_length, self.length)
 
     def check_position(self, position: ArrayLike) -> Array:
         """Returns a position (3,) m; raises `InputError` unless finite and in the hose's plane."""

@@ -27,7 +27,7 @@ from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.mujoco.statics import BodyPoint, ChainSystem, StaticChain, solve_equilibrium
 from hose_mj.hoses.protocol import Array, Reaction
-from hose_mj.hoses.spec import HoseSpec
+from hose_mj.hoses.spec import HoseSpec, check_spec
 
 _ADVICE = (
     "the elastic forces are explicit and unstable; try a smaller timestep, fewer segments or a "
@@ -262,6 +262,7 @@ class MujocoChainHose(MujocoHose):
 
 def check_plain(name: str, spec: HoseSpec) -> None:
     """Raises `InputError` for what no hose inside an mjModel has, `name` being its class."""
+    check_spec(spec)
     for what in ("rest_strain", "rest_curvature", "rest_torsion", "drag"):
         if getattr(spec, what) != 0.0:
             raise InputError(what, getattr(spec, what), f"0 for a {name}")

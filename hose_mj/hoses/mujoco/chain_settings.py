@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, check_choice
-from hose_mj.hoses.inputs import check_count, check_vector
+from hose_mj.hoses.inputs import check_count, check_records, check_vector, read_numbers
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
@@ -37,7 +37,7 @@ class ChainSettings:
     obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
-        check_number("timestep", self.timestep)
+        object.__setattr__(self, "timestep", check_number("timestep", self.timestep))
         check_number("tolerance", self.tolerance, may_be_zero=True)
         check_vector("gravity", self.gravity)
         check_count("segments", self.segments, 2)
@@ -98,7 +98,7 @@ def check_solref(name: str, value: Sequence[float] | None) -> None:
 
 def check_numbers(name: str, value: Sequence[float], count: int) -> Array:
     """Returns an array; raises `InputError` unless `value` has `count` finite numbers."""
-    array = np.asarray(value, dtype=np.float64)
+    array = read_numbers(name, value, f"{count} finite numbers")
     if array.shape != (count,) or not np.all(np.isfinite(array)):
         raise InputError(name, value, f"{count} finite numbers")
     return array
@@ -110,9 +110,7 @@ IMPEDANCE_RATIO = 10.0
 
 def check_obstacles(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
     """Returns the obstacles; raises `InputError` for what is none, or for one that moves."""
-    for obstacle in obstacles:
-        if not isinstance(obstacle, Obstacle):
-            raise InputError("obstacles", obstacle, "records of the class Obstacle")
+    for obstacle in check_records("obstacles", obstacles, Obstacle):
         if np.any(obstacle.velocity) or np.any(obstacle.angular_velocity):
             raise InputError("velocity of an obstacle", obstacle.velocity, "0 for a chain")
     return tuple(obstacles)

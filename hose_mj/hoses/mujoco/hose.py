@@ -142,7 +142,7 @@ class MujocoHose(ABC):
         tangent: ArrayLike | None = None,
     ) -> Hold:
         """Holds a point, the tangent and, where there is any, the twist; by default as they are."""
-        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        s = inputs.check_place(arc_length, self.spec.length)
         where = self._check_target(s, position)
         frame = self._model.motion().frame(s)
         if tangent is not None:
@@ -151,7 +151,7 @@ class MujocoHose(ABC):
 
     def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
         """Holds a point and leaves the tangent free; by default where it is now."""
-        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        s = inputs.check_place(arc_length, self.spec.length)
         where = self._check_target(s, position)
         return self._add_hold(s, where, np.array([1.0, 0.0, 0.0, 0.0]), fixes_tangent=False)
 
@@ -172,6 +172,7 @@ class MujocoHose(ABC):
                 spins that add up to pi or more in one step: a weld would go the shorter way.
         """
         place = self._find(hold)
+        check_number("spin", spin, may_be_negative=True)
         held = self._held[place]
         where, frame = held.position, held.frame
         if position is not None:
@@ -209,12 +210,12 @@ class MujocoHose(ABC):
 
     def apply_force(self, arc_length: float, force: ArrayLike) -> None:
         """Adds a point force (3,) N in the world frame that acts until `clear_loads`."""
-        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        s = inputs.check_place(arc_length, self.spec.length)
         self._add_load(Load(s, check_vector("force", force), np.zeros(3)))
 
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
         """Adds a point moment (3,) N m in the world frame that acts until `clear_loads`."""
-        s = float(check_arc_lengths(arc_length, self.spec.length)[0])
+        s = inputs.check_place(arc_length, self.spec.length)
         self._add_load(Load(s, np.zeros(3), check_vector("moment", moment)))
 
     def clear_loads(self) -> None:
@@ -268,10 +269,10 @@ class MujocoHose(ABC):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot of this hose."""
-        missing = {"holds", "loads", "next_number", "numbers", "replay"} - state.keys()
-        if missing:
-            raise InputError("state", sorted(state), f"a snapshot; {sorted(missing)} missing")
+        """Returns to a snapshot of this hose; `InputError` for what is none."""
+        inputs.restore_snapshot(state, self.snapshot(), self._restore)
+
+    def _restore(self, state: dict[str, Any]) -> None:
         held = [Held.from_numbers(row) for row in np.asarray(state["holds"])]
         made = self._make_model(held)
         made.set_numbers(np.asarray(state["numbers"]))
@@ -311,8 +312,7 @@ class MujocoHose(ABC):
         return self._check_direction(direction / length)
 
     def _check_spin(self, held: Held, spin: float) -> float:
-        """Returns a spin (rad) that is finite, possible here and below pi with those before."""
-        check_number("spin", spin, may_be_zero=True, may_be_negative=True)
+        """Returns a spin (rad) that is possible here and below pi with those before."""
         if spin != 0.0 and not self.twists:
             raise InputError("spin", spin, f"0 for a {type(self).__name__}, which has no twist")
         if abs(held.spun + spin) >= np.pi:
@@ -322,7 +322,7 @@ class MujocoHose(ABC):
     def _find(self, hold: Hold) -> int:
         """Place of a hold among those that act now."""
         for place, held in enumerate(self._held):
-            if held.hold == hold:
+            if isinstance(hold, Hold) and held.hold == hold:
                 return place
         raise InputError("hold", hold, f"one of {[held.hold for held in self._held]}")
 

@@ -1,7 +1,5 @@
 """Bars with intervals beside the values that others found, a panel for each data set."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,41 +21,27 @@ from hose_mj.recording.plots.style import (
     write_note,
 )
 
-HEIGHT = 0.38
-"""Room of an item over all its bars, in inches."""
-FILLED = 0.8
-"""Part of that room which the bars fill."""
+HEIGHT = 0.38  # room of an item over all its bars, in inches
+FILLED = 0.8  # part of that room which the bars fill
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A share between 0 and 1.
+    """A share between 0 and 1."""
 
-    Attributes:
-        value: its length; NaN for no bar.
-        interval: half width of its interval; NaN for none.
-        reference: what others found; None for nothing.
-        sure: whether the reference can be right as printed; its mark is hollow if not.
-    """
-
-    value: float
-    interval: float = math.nan
-    reference: float | None = None
-    sure: bool = True
+    value: float  # its length; NaN for no bar
+    interval: float = math.nan  # half width of its interval; NaN for none
+    reference: float | None = None  # what others found; None for nothing
+    sure: bool = True  # whether the reference can be right as printed; its mark is hollow if not
 
 
 @dataclass(frozen=True)
 class BarPanel:
-    """One data set.
+    """One data set."""
 
-    Attributes:
-        title: above its axes.
-        series: label to one bar for each item.
-        guide: a share to draw a line at, with its name; None for no line.
-    """
-
-    title: str
-    series: Mapping[str, Sequence[Bar]]
+    title: str  # above its axes
+    series: Mapping[str, Sequence[Bar]]  # label to one bar for each item
+    # A share to draw a line at, with its name; None for no line.
     guide: tuple[float, str] | None = None
 
 

@@ -1,7 +1,5 @@
 """Plots of curves: convergence with orders, numbers over time, learning."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -92,7 +90,6 @@ def plot_series(
     ylabel: str,
     groups: Mapping[str, tuple[ArrayLike, ArrayLike]],
     limits: Mapping[str, float] | None = None,
-    logy: bool = False,
 ) -> bytes:
     """Draws numbers over time, lines named at their ends; `limits` go across with their names."""
     check_some("groups", groups)
@@ -101,7 +98,6 @@ def plot_series(
     with make_axes(title, (7.6, 3.3)) as (figure, axes):
         for rank, (label, (times, values)) in enumerate(groups.items()):
             t, y = check_pair(label, times, values)
-            y = np.where(y > 0.0, y, np.nan) if logy else y
             width = 1.3 + 1.1 * (len(groups) - 1 - rank) / max(len(groups) - 1, 1)
             axes.plot(t, y, color=looks[label].color, ls=looks[label].dashes, lw=width)
             seen = y[np.isfinite(y)]
@@ -110,8 +106,6 @@ def plot_series(
         for name, limit in (limits or {}).items():
             axes.axhline(limit, color=ink, lw=0.9, ls=(0, (4, 3)))
             ends.append((limit, name, ink))
-        if logy:
-            set_log(axes, x=False, y=True)
         every = np.concatenate([np.ravel(times) for times, _ in groups.values()])
         axes.set_xlim(float(every.min()), float(every.max()) or 1.0)
         axes.set_xlabel("time (s)")
@@ -138,48 +132,34 @@ def _choose_looks(labels: Sequence[str]) -> dict[str, Look]:
     return looks
 
 
-PANEL = (4.6, 3.5)
-"""Width and height of a panel (inches)."""
+PANEL = (4.6, 3.5)  # width and height of a panel (inches)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One line; values that are not finite are left out.
+    """One line; values that are not finite are left out."""
 
-    Attributes:
-        x: (k,).
-        middle: (k,).
-        low, high: its band (k,).
-    """
-
-    x: ArrayLike
-    middle: ArrayLike
+    x: ArrayLike  # (k,)
+    middle: ArrayLike  # (k,)
+    # low, high: its band (k,).
     low: ArrayLike
     high: ArrayLike
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One measure of all learners.
+    """One measure of all learners."""
 
-    Attributes:
-        name: of the measure, with its unit.
-        curves: by label; the same labels in all panels.
-        scale: "share" from 0 to 1, "log" or "linear".
-    """
-
-    name: str
-    curves: Mapping[str, Curve]
-    scale: Literal["share", "log", "linear"] = "linear"
+    name: str  # of the measure, with its unit
+    curves: Mapping[str, Curve]  # by label; the same labels in all panels
+    scale: Literal["share", "log", "linear"] = "linear"  # "share" from 0 to 1, "log" or "linear"
 
 
 def plot_learning(title: str, xlabel: str, panels: Sequence[Panel]) -> bytes:
     """Draws panels side by side; each line's name stands at its end, in the last panel.
 
     Each line has dashes of its own, so that one shows through another that lies over it.
-
-    Raises:
-        InputError: no panel, one without curves, or arrays of different lengths.
+    `InputError` is raised for no panel, one without curves, or arrays of different lengths.
     """
     check_some("panels", panels)
     labels = list(dict.fromkeys(label for panel in panels for label in panel.curves))

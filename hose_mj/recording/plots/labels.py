@@ -1,7 +1,5 @@
 """Texts in plots that do not overlap: beside points, and at the ends of lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 

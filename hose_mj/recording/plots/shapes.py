@@ -1,7 +1,5 @@
 """Plots of shapes, to scale: snapshots of a motion, and fans of equilibria."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,17 +34,11 @@ _SOLID = "#d9d9d9"
 
 @dataclass(frozen=True)
 class Fan:
-    """The equilibria of one model over a parameter.
+    """The equilibria of one model over a parameter."""
 
-    Attributes:
-        name: what the reader calls it; starts with the model's id.
-        curves: centre line (m, 3) by parameter ("\u0393 = 10").
-        dotted: drawn thin and dotted, and without the parameters' names.
-    """
-
-    name: str
-    curves: Mapping[str, ArrayLike]
-    dotted: bool = False
+    name: str  # what the reader calls it; starts with the model's id
+    curves: Mapping[str, ArrayLike]  # centre line (m, 3) by parameter ("Γ = 10")
+    dotted: bool = False  # drawn thin and dotted, and without the parameters' names
 
 
 def plot_shapes(

@@ -1,7 +1,5 @@
 """Errors against closed forms: one panel per model, one line per parameter, over the resolution."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -34,20 +32,13 @@ _CORRECTED: dict[str, Any] = {"ls": "-", "lw": 1.4, "ms": 4.2, "mew": 0.8, "zord
 
 @dataclass(frozen=True)
 class ErrorPoint:
-    """One result of one model.
+    """One result of one model."""
 
-    Attributes:
-        model: model id; each has a panel.
-        parameter: of the case ("\u0393 = 10"), "" where there is none; each has a line.
-        resolution: control points or segments.
-        error: as a fraction.
-        clamp_corrected: True or False for a model whose clamp needs correcting, else None.
-    """
-
-    model: str
-    parameter: str
-    resolution: int
-    error: float
+    model: str  # model id; each has a panel
+    parameter: str  # of the case ("Γ = 10"), "" where there is none; each has a line
+    resolution: int  # control points or segments
+    error: float  # as a fraction
+    # True or False for a model whose clamp needs correcting, else None.
     clamp_corrected: bool | None = None
 
 

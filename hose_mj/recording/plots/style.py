@@ -1,15 +1,14 @@
 """One look for every plot: figures, axes, units, levels, slopes, notes, checked input."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib import rc_context, rc_params_from_file
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -28,39 +27,8 @@ SOFT = "#666666"
 """Colour of guides' names and other text that stands back."""
 HALO = (withStroke(linewidth=2.2, foreground="white"),)
 """Keeps small text readable over faint points and lines."""
-ERRORS = (1e-2, 1e-3)
-"""Error levels drawn across plots."""
-STYLE: dict[str, Any] = {
-    "font.family": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "axes.titlesize": 11.0,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.titlepad": 10.0,
-    "axes.labelsize": 9.0,
-    "axes.linewidth": 0.7,
-    "axes.edgecolor": "#444444",
-    "axes.labelcolor": "#222222",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.5,
-    "xtick.color": "#444444",
-    "ytick.color": "#444444",
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "lines.linewidth": 1.6,
-    "lines.markersize": 5.5,
-    "legend.frameon": False,
-    "legend.handlelength": 2.2,
-    "legend.columnspacing": 1.6,
-    "legend.fontsize": 8.5,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-}
+ERRORS = (1e-2, 1e-3)  # error levels drawn across plots
+STYLE = rc_params_from_file(Path(__file__).with_name("house.mplstyle"), use_default_template=False)
 DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 """Dash patterns that tell lines apart."""
 
@@ -92,7 +60,7 @@ def choose_looks(labels: Sequence[str]) -> dict[str, Look]:
 @contextmanager
 def make_figure(size: tuple[float, float], title: str = "") -> Iterator[Figure]:
     """Yields a figure of `size` inches in the house style; no global state is touched."""
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+    with rc_context(STYLE):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         if title:

@@ -3,8 +3,6 @@
 Arrows say how much more a peer costs at equal error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -43,28 +41,19 @@ from hose_mj.recording.plots.style import (
     write_note,
 )
 
-OVERVIEW = (1600 / 150, 700 / 150)
-"""Size of the overview (inches)."""
-_SHIFT = 6.0
-"""Distance of an arrow from its level (points of length)."""
+OVERVIEW = (1600 / 150, 700 / 150)  # size of the overview (inches)
+_SHIFT = 6.0  # distance of an arrow from its level (points of length)
 
 
 @dataclass(frozen=True)
 class WorkPoint:
-    """One setting of one model with its cost.
+    """One setting of one model with its cost."""
 
-    Attributes:
-        model: model id, or "geds planar"; points of one model make a series.
-        label: the setting, short ("16, 1 ms").
-        error: as a fraction.
-        wall_s_per_sim_s: wall over simulated time.
-        clamp_corrected: True or False for a model whose clamp needs correcting, else None.
-    """
-
-    model: str
-    label: str
-    error: float
-    wall_s_per_sim_s: float
+    model: str  # model id, or "geds planar"; points of one model make a series
+    label: str  # the setting, short ("16, 1 ms")
+    error: float  # as a fraction
+    wall_s_per_sim_s: float  # wall over simulated time
+    # True or False for a model whose clamp needs correcting, else None.
     clamp_corrected: bool | None = None
 
     @property
@@ -75,16 +64,11 @@ class WorkPoint:
 
 @dataclass(frozen=True)
 class Gap:
-    """An arrow that says what a peer costs more at equal error.
+    """An arrow that says what a peer costs more at equal error."""
 
-    Attributes:
-        at_error: the level, as a fraction.
-        against: model id of the peer.
-        cost, cost_against: wall over simulated time of the two.
-    """
-
-    at_error: float
-    against: str
+    at_error: float  # the level, as a fraction
+    against: str  # model id of the peer
+    # cost, cost_against: wall over simulated time of the two.
     cost: float
     cost_against: float
 
@@ -238,10 +222,7 @@ def _draw_gap(axes: Axes, gap: Gap, look: Look) -> tuple[Annotation, Annotation]
 
 
 def _choose_labels(
-    axes: Axes,
-    fronts: Sequence[Sequence[WorkPoint]],
-    looks: Mapping[str, Look],
-    spacing: float,
+    axes: Axes, fronts: Sequence[Sequence[WorkPoint]], looks: Mapping[str, Look], spacing: float
 ) -> list[Label]:
     """Labels of front points: first those that reach a level most cheaply, then some others.
 

@@ -1,7 +1,5 @@
 """A comparison of hose models as a Rerun recording: one tab per scene, the models overlaid."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,59 +12,34 @@ from hose_mj.errors import InputError
 from hose_mj.recording.episode import Array, HoseTrack, Scene, Series, check_unique
 from hose_mj.recording.files import write_atomically
 from hose_mj.recording.palette import LIMIT, find_color, lighten, name_model
-from hose_mj.recording.rerun.parts import (
-    HALF_VIEW,
-    escape_cell,
-    format_table,
-    log_document,
-    log_scalars,
-    make_blueprint,
-    make_space_view,
-    make_time,
-    name_quantity,
-    open_stream,
-    round_spacing,
-)
+from hose_mj.recording.rerun import parts
 
 _UNITLESS = "number"
-_ASPECT = 1.4
-"""Width over height that a view is assumed to have."""
+_ASPECT = 1.4  # width over height that a view is assumed to have
 _THINNER = 0.55
-_FLAT = 1e-2
-"""A scene is planar if it is this much thinner than it is large."""
+_FLAT = 1e-2  # a scene is planar if it is this much thinner than it is large
 
 
 @dataclass(frozen=True, eq=False)
 class Framing:
-    """A view of a scene, in world coordinates (m).
+    """A view of a scene, in world coordinates (m)."""
 
-    Attributes:
-        eye, target, up: the camera, (3,) each.
-        size: largest extent of the scene.
-        half_height: of what the eye sees at the target's distance.
-        grid_normal: of the grid's plane, a unit axis (3,).
-        grid_distance: of the grid's plane from the origin, along the normal.
-        grid_spacing: 1, 2 or 5 times a power of ten, about a tenth of the size.
-        corner: upper left of the scene as seen from the eye, where the legend begins.
-        is_planar: whether the scene is flat, and seen straight on.
-    """
-
+    # eye, target, up: the camera, (3,) each.
     eye: Array
     target: Array
     up: Array
-    size: float
-    half_height: float
-    grid_normal: Array
-    grid_distance: float
-    grid_spacing: float
-    corner: Array
-    is_planar: bool
+    size: float  # largest extent of the scene
+    half_height: float  # of what the eye sees at the target's distance
+    grid_normal: Array  # of the grid's plane, a unit axis (3,)
+    grid_distance: float  # of the grid's plane from the origin, along the normal
+    grid_spacing: float  # 1, 2 or 5 times a power of ten, about a tenth of the size
+    corner: Array  # upper left of the scene as seen from the eye, where the legend begins
+    is_planar: bool  # whether the scene is flat, and seen straight on
 
     @property
     def eye_up(self) -> Array:
         """Returns the world axis that stays upright when the reader turns the view, (3,)."""
-        axis: Array = np.eye(3)[int(np.argmax(np.abs(self.up)))]
-        return axis
+        return np.asarray(np.eye(3)[int(np.argmax(np.abs(self.up)))])
 
     def clip_radii(self, scene: Scene) -> dict[str, float]:
         """Returns the radius that each track is drawn with (m), by name.
@@ -105,9 +78,9 @@ def compute_framing(scene: Scene) -> Framing:
     # From there the eye sees all points.
     about = seen - middle
     room = np.maximum(np.abs(about[:, 0]) / _ASPECT, np.abs(about[:, 1]))
-    needed = float(np.max(1.25 * room / HALF_VIEW + about[:, 2]))
-    distance = max(needed, 0.25 * size / HALF_VIEW)
-    half_height = distance * HALF_VIEW
+    needed = float(np.max(1.25 * room / parts.HALF_VIEW + about[:, 2]))
+    distance = max(needed, 0.25 * size / parts.HALF_VIEW)
+    half_height = distance * parts.HALF_VIEW
     left = seen[:, 0].min() - middle[0] - 0.3 * half_height
     left = float(np.clip(left, -1.1 * half_height, -0.9 * half_height))
     normal = np.eye(3)[flat[0]] if flat else np.array([0.0, 0.0, 1.0])
@@ -119,7 +92,7 @@ def compute_framing(scene: Scene) -> Framing:
         half_height=half_height,
         grid_normal=normal,
         grid_distance=float(normal @ low),
-        grid_spacing=round_spacing(0.1 * size),
+        grid_spacing=parts.round_spacing(0.1 * size),
         corner=(middle + np.array([left, 0.8 * half_height, 0.0])) @ axes,
         is_planar=bool(flat),
     )
@@ -157,8 +130,10 @@ def write_recording(
         raise InputError("recording_id", recording_id, "a text that is not blank")
     framings = [compute_framing(scene) for scene in scenes]
     tabs = [_make_tab(scene, framing) for scene, framing in zip(scenes, framings, strict=True)]
-    stream, encode = open_stream(make_blueprint(rrb.Tabs(*tabs, active_tab=0)), recording_id)
-    log_document(stream, "settings", f"# Settings\n\n{format_table(settings)}")
+    stream, encode = parts.open_stream(
+        parts.make_blueprint(rrb.Tabs(*tabs, active_tab=0)), recording_id
+    )
+    parts.log_document(stream, "settings", f"# Settings\n\n{parts.format_table(settings)}")
     for scene, framing in zip(scenes, framings, strict=True):
         _log_scene(stream, scene, framing)
     write_atomically(Path(path), encode())
@@ -166,7 +141,7 @@ def write_recording(
 
 def _log_scene(stream: rr.RecordingStream, scene: Scene, framing: Framing) -> None:
     note = f"# {scene.title}\n\n{scene.note}\n\n{format_legend(scene)}"
-    log_document(stream, f"{scene.name}/note", note)
+    parts.log_document(stream, f"{scene.name}/note", note)
     for track in scene.tracks:
         _log_track(stream, scene, track, framing)
     steps = 0.14 * framing.half_height * np.arange(len(scene.tracks))
@@ -193,13 +168,15 @@ def _log_track(
     stream.log(path, rr.Transform3D(translation=shift), static=True)
     points = track.points.astype(np.float32)
     stream.log(path, rr.LineStrips3D.from_fields(radii=[radius], colors=[track.color]), static=True)
-    stream.send_columns(path, [make_time(track.times)], rr.LineStrips3D.columns(strips=points))
+    stream.send_columns(
+        path, [parts.make_time(track.times)], rr.LineStrips3D.columns(strips=points)
+    )
     ends = points[:, [0, -1]]
     style = rr.Points3D.from_fields(radii=[1.6 * radius], colors=[track.color])
     stream.log(f"{path}/ends", style, static=True)
     columns = rr.Points3D.columns(positions=ends.reshape(-1, 3))
     stream.send_columns(
-        f"{path}/ends", [make_time(track.times)], columns.partition([2] * len(track.times))
+        f"{path}/ends", [parts.make_time(track.times)], columns.partition([2] * len(track.times))
     )
 
 
@@ -208,14 +185,14 @@ def _log_series(
 ) -> None:
     color = series.color or find_color(series.name, position)
     unit = f" ({series.unit})" if series.unit else ""
-    log_scalars(
+    parts.log_scalars(
         stream, path, series.times, series.values, name_model(series.name) + unit, color, width
     )
     if series.limit is not None:
         times = series.times[[0, -1]] if len(series.times) > 1 else series.times
         values = np.full(len(times), series.limit)
         name = f"limit of {series.name}"
-        log_scalars(stream, f"{path}/limit", times, values, name, LIMIT, 1.0)
+        parts.log_scalars(stream, f"{path}/limit", times, values, name, LIMIT, 1.0)
 
 
 def _name_folder(scene: Scene, unit: str) -> str:
@@ -224,7 +201,7 @@ def _name_folder(scene: Scene, unit: str) -> str:
 
 
 def _make_tab(scene: Scene, framing: Framing) -> rrb.Horizontal:
-    above = make_space_view(
+    above = parts.make_space_view(
         scene.title,
         (framing.eye, framing.target, framing.eye_up),
         (framing.grid_spacing, framing.grid_normal, framing.grid_distance),
@@ -235,7 +212,7 @@ def _make_tab(scene: Scene, framing: Framing) -> rrb.Horizontal:
     below = [
         rrb.TimeSeriesView(
             origin=f"/{_name_folder(scene, unit)}",
-            name=name_quantity(unit),
+            name=parts.name_quantity(unit),
             plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=True),
         )
         for unit in units
@@ -250,8 +227,9 @@ def _make_tab(scene: Scene, framing: Framing) -> rrb.Horizontal:
 
 def format_legend(scene: Scene) -> str:
     """Returns one Markdown line per track: name, number of points and samples, radius."""
+    cell = parts.escape_cell
     lines = [
-        f"| {escape_cell(t.name)} | {len(t.arc_lengths)} | {len(t.times)} | {1e3 * t.radius:.3g} |"
+        f"| {cell(t.name)} | {len(t.arc_lengths)} | {len(t.times)} | {1e3 * t.radius:.3g} |"
         for t in scene.tracks
     ]
     head = ["| hose | points | samples | radius (mm) |", "|---|---|---|---|"]

@@ -1,7 +1,5 @@
 """Recordings of episodes, whole ones in worlds and on grids, and sinks for those that go on."""
 
-from __future__ import annotations
-
 import time
 import uuid
 from collections.abc import Sequence
@@ -19,32 +17,22 @@ from hose_mj.recording.grid import GridEpisode
 from hose_mj.recording.rerun.parts import APPLICATION_ID, is_listening, open_stream, wait_until
 from hose_mj.recording.rerun.viewer import open_window
 from hose_mj.recording.rerun.world_log import WorldLog
-from hose_mj.recording.rerun.world_scene import (
-    Look,
-    log_scene,
-    log_settings,
-    make_world_blueprint,
-)
+from hose_mj.recording.rerun.world_scene import Look, log_scene, log_settings, make_world_blueprint
 from hose_mj.recording.scene_description import SceneDescription
 from hose_mj.recording.sinks import Background, Sink
 from hose_mj.recording.world_episode import EpisodeEnding, Samples, WorldEpisode
 
-_STRETCH_S = 30.0
-"""How long a viewer may take for one stretch before the rest is kept from it (s)."""
-_START_S = 20.0
-"""How long a viewer may take to start (s)."""
+_STRETCH_S = 30.0  # how long a viewer may take for one stretch before the rest is kept from it (s)
+_START_S = 20.0  # how long a viewer may take to start (s)
 
 
-def write_world_recording(
-    path: Path, episodes: Sequence[WorldEpisode], recording_id: str | None = None
-) -> None:
+def write_world_recording(path: Path, episodes: Sequence[WorldEpisode]) -> None:
     """Writes one .rrd of an episode, or of several overlaid in one scene; whole or not at all.
 
     Args:
         path: replaced if it exists.
         episodes: the first in its own colours, the others tinted and see-through; names of their
             scenes all different.
-        recording_id: tells recordings apart in the viewer; a new one by default.
 
     Raises:
         InputError: no episode, or two of one name.
@@ -53,7 +41,7 @@ def write_world_recording(
         raise InputError("episodes", episodes, "at least one")
     scenes = [episode.scene for episode in episodes]
     check_unique("episodes", [scene.name for scene in scenes])
-    stream, encode = open_stream(make_world_blueprint(scenes), recording_id)
+    stream, encode = open_stream(make_world_blueprint(scenes))
     log_settings(stream, scenes, [describe_ending(e.scene, e.ending) for e in episodes])
     log_scene(stream, scenes[0])
     for rank, episode in enumerate(episodes):
@@ -164,11 +152,7 @@ class LiveView:
         self._url, self._id, self._wait = url, recording_id, wait_s
 
     def begin(self, scene: SceneDescription) -> None:
-        """Connects and shows the scene.
-
-        Raises:
-            HoseError: nobody listens.
-        """
+        """Connects and shows the scene; `HoseError` where nobody listens."""
         place, deadline = check_url(self._url), time.monotonic() + self._wait
         wait_until(lambda: is_listening(*place), deadline, f"no viewer listens at {self._url}")
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=self._id)

@@ -1,7 +1,5 @@
 """Pieces that all recordings share: stream, layout, plain entities, texts, waiting."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable
@@ -18,22 +16,12 @@ from hose_mj.recording.palette import Rgb
 APPLICATION_ID = "hose_mj"
 TIMELINE = "sim_time"
 TURNS = "turn"
-OUTCOME = "outcome"
-"""Begins the names of the properties that say how episodes ended."""
+OUTCOME = "outcome"  # begins the names of the properties that say how episodes ended
 FACTS = ("ended_by", "break_kind", "break_time", "break_text")
-DARK = (17, 20, 24)
-"""Ground colour of the spatial views."""
-HALF_VIEW = float(np.tan(np.radians(27.5)))
-"""The viewer's vertical field of view is 55 degrees."""
-_QUANTITIES = {
-    "m": "Distance",
-    "mm": "Distance",
-    "m/s": "Speed",
-    "N": "Force",
-    "N m": "Moment",
-    "J": "Energy",
-    "rad": "Angle",
-}
+DARK = (17, 20, 24)  # ground colour of the spatial views
+HALF_VIEW = float(np.tan(np.radians(27.5)))  # the viewer's vertical field of view is 55 degrees
+_QUANTITIES = {"m": "Distance", "mm": "Distance", "m/s": "Speed", "N": "Force", "N m": "Moment"}
+_QUANTITIES |= {"J": "Energy", "rad": "Angle"}
 
 
 def open_stream(

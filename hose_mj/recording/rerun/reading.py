@@ -1,7 +1,5 @@
 """Reads Rerun recordings back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -57,10 +55,8 @@ def read_outcomes(path: Path) -> dict[str, dict[str, Any]]:
     """Returns how the episodes of a recording ended, by the name of the hose model.
 
     Each has `ended_by`, and where a constraint broke `break_kind`, `break_time` (s) and
-    `break_text`. Empty for a recording without episodes in a world.
-
-    Raises:
-        InputError: no such file, or nothing recorded in it.
+    `break_text`. Empty for a recording without episodes in a world. `InputError` is raised for no
+    such file, or nothing recorded in it.
     """
     read_recording(path)
     reader = _open_reader(path)

@@ -1,7 +1,5 @@
 """Rerun's viewer, on this machine only: in a window, or without one for pictures, always ended."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket
@@ -26,8 +24,7 @@ DEBIAN_PACKAGES = ("mesa-vulkan-drivers", "libvulkan1")
 _HOST = "127.0.0.1"
 _STILL = 3  # pictures in a row that must agree before the viewer counts as done drawing
 _FOLDERS = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME")
-_START_S = 30.0
-"""How long a viewer may take to start (s)."""
+_START_S = 30.0  # how long a viewer may take to start (s)
 
 
 @dataclass(frozen=True)

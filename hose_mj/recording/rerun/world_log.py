@@ -1,7 +1,5 @@
 """The samples of an episode in a world as Rerun entities; the paths stand in the package."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -151,8 +149,7 @@ class WorldLog:
         places, forces = samples.rows["attachments"], samples.rows["forces"]
         k, n = places.shape[:2]
         columns = rr.Arrows3D.columns(
-            vectors=scale_forces(self.scene, forces).reshape(-1, 3),
-            origins=places.reshape(-1, 3),
+            vectors=scale_forces(self.scene, forces).reshape(-1, 3), origins=places.reshape(-1, 3)
         )
         path = path_of(self.scene, "forces")
         self.stream.send_columns(path, index, columns.partition([n] * k))

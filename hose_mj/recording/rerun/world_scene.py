@@ -1,7 +1,5 @@
 """Logs what of an episode in a world stands still, and lays out what the viewer shows of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,17 +10,7 @@ import rerun.blueprint as rrb
 
 from hose_mj.recording.episode import Array
 from hose_mj.recording.palette import Rgb, make_tension_scale, mix
-from hose_mj.recording.rerun.parts import (
-    DARK,
-    HALF_VIEW,
-    TIMELINE,
-    format_table,
-    log_document,
-    make_blueprint,
-    make_space_view,
-    name_quantity,
-    round_spacing,
-)
+from hose_mj.recording.rerun import parts
 from hose_mj.recording.scene_description import WORLD, Geom, Rgba, SceneDescription
 
 SCENE = "world/scene"
@@ -32,8 +20,7 @@ TINTS: tuple[Rgb, ...] = ((255, 255, 255), (0, 190, 170), (225, 110, 200), (110,
 """Colours of the overlaid episodes from the second on: none is near one of the tension."""
 BOUNDS_COLOR = (150, 165, 185)
 CELL_COLOR = (120, 132, 148)
-_LONGEST_ARROW = 0.3
-"""Largest length of an arrow over the scene's size: longer ones are cut."""
+_LONGEST_ARROW = 0.3  # largest length of an arrow over the scene's size: longer ones are cut
 _PLANE_THICKNESS = 0.004
 """Thickness, over the scene's size, of the thin box whose top stands for a plane."""
 _LOOKS = {True: (0.25, -0.8, 0.95), False: (0.45, -1.0, 0.5)}
@@ -42,13 +29,9 @@ _LOOKS = {True: (0.25, -0.8, 0.95), False: (0.45, -1.0, 0.5)}
 
 @dataclass(frozen=True)
 class Look:
-    """The look that tells one of several overlaid episodes apart.
+    """The look that tells one of several overlaid episodes apart."""
 
-    Attributes:
-        rank: 0 for the first, in the scene's own colours; the others are tinted and see-through.
-    """
-
-    rank: int
+    rank: int  # 0 for the first, in the scene's own colours; the others are tinted and see-through
 
     @property
     def color(self) -> Rgb:
@@ -62,9 +45,9 @@ class Look:
         return (*mix(color[:3], self.color, 0.65), round(0.45 * color[3]))
 
 
-def path_of(scene: SceneDescription, *parts: str) -> str:
+def path_of(scene: SceneDescription, *names: str) -> str:
     """Returns the entity path of what belongs to one episode's part of the world."""
-    return "/".join(["world", *map(rr.escape_entity_path_part, (scene.name, *parts))])
+    return "/".join(["world", *map(rr.escape_entity_path_part, (scene.name, *names))])
 
 
 def log_scene(stream: rr.RecordingStream, scene: SceneDescription) -> None:
@@ -103,8 +86,8 @@ def log_settings(
             "violet arrow": f"force, {scale * force_scale(scene):.3g} m for {scale:g} N",
             "longest arrow": f"from {_LONGEST_ARROW * scene.size / force_scale(scene):.3g} N on",
         }
-        lines.append(format_table({"model": scene.name, **scene.settings, **shown}))
-    log_document(stream, "settings", "\n\n".join(lines))
+        lines.append(parts.format_table({"model": scene.name, **scene.settings, **shown}))
+    parts.log_document(stream, "settings", "\n\n".join(lines))
 
 
 def force_scale(scene: SceneDescription) -> float:
@@ -239,15 +222,17 @@ def make_world_blueprint(scenes: Sequence[SceneDescription], follow: bool = Fals
     }
     shared: Any = {"origin": "/world", "overrides": hidden}
     ground = scene.low[2] - 0.01 * scene.size
-    grid = (round_spacing(0.1 * scene.size), np.array([0.0, 0.0, 1.0]), ground)
+    grid = (parts.round_spacing(0.1 * scene.size), np.array([0.0, 0.0, 1.0]), ground)
     views = rrb.Horizontal(
-        make_space_view("In space", _place_eye(scene), grid, contents=contents, **shared),
-        make_space_view("From above", _place_top(scene), grid, contents=unnamed, **shared),
+        parts.make_space_view("In space", _place_eye(scene), grid, contents=contents, **shared),
+        parts.make_space_view("From above", _place_top(scene), grid, contents=unnamed, **shared),
         column_shares=[1.35, 1.0],
     )
     left = rrb.Vertical(views, _make_scale(scene), _make_plots(scenes), row_shares=[3.4, 0.5, 1.5])
     # Time, level and text: whose entity it is says little.
-    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
+    columns = rrb.TextLogColumns(
+        timeline_columns=[parts.TIMELINE], text_log_columns=["LogLevel", "Body"]
+    )
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/settings", name="Settings"),
         rrb.StateTimelineView(origin="/states", name="Turns, vetoes, breaks"),
@@ -255,7 +240,7 @@ def make_world_blueprint(scenes: Sequence[SceneDescription], follow: bool = Fals
         row_shares=[1.6, 1.0, 1.0],
     )
     both = rrb.Horizontal(left, side, column_shares=[3.4, 1.0])
-    return make_blueprint(both, follow)
+    return parts.make_blueprint(both, follow)
 
 
 def _place_eye(scene: SceneDescription) -> tuple[Array, Array, Array]:
@@ -264,14 +249,14 @@ def _place_eye(scene: SceneDescription) -> tuple[Array, Array, Array]:
     outward = np.array(_LOOKS[scene.is_planar])
     outward /= np.linalg.norm(outward)
     radius = 0.5 * float(np.linalg.norm(scene.high - scene.low))
-    return middle + radius / HALF_VIEW * outward, middle, np.array([0.0, 0.0, 1.0])
+    return middle + radius / parts.HALF_VIEW * outward, middle, np.array([0.0, 0.0, 1.0])
 
 
 def _place_top(scene: SceneDescription) -> tuple[Array, Array, Array]:
     """Looks straight down, x to the right and y upwards."""
     middle = 0.5 * (scene.low + scene.high)
     room = np.max((scene.high - scene.low)[:2]) / 2.0
-    height = np.array([0.0, 0.0, scene.high[2] - middle[2] + 1.12 * room / HALF_VIEW])
+    height = np.array([0.0, 0.0, scene.high[2] - middle[2] + 1.12 * room / parts.HALF_VIEW])
     return middle + height, middle, np.array([0.0, 1.0, 0.0])
 
 
@@ -279,7 +264,7 @@ def _make_scale(scene: SceneDescription) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin=f"/{SCALE}",
         name=f"Tension of the hose: red at its limit, {scene.tension_limit:.3g} N",
-        background=rrb.Background(color=DARK),
+        background=rrb.Background(color=parts.DARK),
         visual_bounds=rrb.VisualBounds2D(x_range=[-30, 430], y_range=[-5, 31]),
     )
 
@@ -291,7 +276,7 @@ def _make_plots(scenes: Sequence[SceneDescription]) -> rrb.Horizontal:
     plots = [
         rrb.TimeSeriesView(
             origin="/plots",
-            name=f"Margins: {name_quantity(unit)}, broken below 0",
+            name=f"Margins: {parts.name_quantity(unit)}, broken below 0",
             contents=[f"/plots/{name}/{unit}/**" for name in names],
             plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=True),
         )

@@ -1,7 +1,5 @@
 """The tables [[holds]] of a user's file: where the hose is held, how holds move and turn."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,24 +9,18 @@ from hose_mj.toml_table import TomlTable
 
 Vector = tuple[float, float, float]
 PROFILES = ("smooth", "linear")
-FARTHEST = 1e5
-"""Positions are within this distance of the origin along each axis (m)."""
-LONGEST = 3600.0
-"""Movements end by then (s)."""
-_APART = 1e-6
-"""Holds are at least this fraction of the length apart."""
+FARTHEST = 1e5  # positions are within this distance of the origin along each axis (m)
+LONGEST = 3600.0  # movements end by then (s)
+_APART = 1e-6  # holds are at least this fraction of the length apart
 
 
 @dataclass(frozen=True)
 class Timed:
-    """A change from `start` on (s), for `duration` (s).
+    """A change over time."""
 
-    Its profile is "smooth" (half a cosine: starts and ends at rest) or "linear".
-    """
-
-    start: float
-    duration: float
-    profile: str
+    start: float  # s
+    duration: float  # s
+    profile: str  # "smooth" (half a cosine: starts and ends at rest) or "linear"
 
     @property
     def end(self) -> float:
@@ -64,23 +56,15 @@ class Spin(Timed):
 
 @dataclass(frozen=True)
 class Grasp:
-    """One hold.
+    """One hold."""
 
-    Attributes:
-        arc_length: where along the hose (m).
-        position: where in the world at first (m).
-        tangent: unit tangent of a clamp at first; None for an attachment.
-        moves: one after the other.
-        spins: one after the other.
-        director: unit vector m1 of the material at a clamp at first, about which
-            `bending_stiffness` bends; None for one of our choice.
-    """
-
-    arc_length: float
-    position: Vector
-    tangent: Vector | None
-    moves: tuple[Movement, ...] = ()
-    spins: tuple[Spin, ...] = ()
+    arc_length: float  # where along the hose (m)
+    position: Vector  # where in the world at first (m)
+    tangent: Vector | None  # unit tangent of a clamp at first; None for an attachment
+    moves: tuple[Movement, ...] = ()  # one after the other
+    spins: tuple[Spin, ...] = ()  # one after the other
+    # Unit vector m1 of the material at a clamp at first, about which `bending_stiffness` bends;
+    # None for one of our choice.
     director: Vector | None = None
 
     @property

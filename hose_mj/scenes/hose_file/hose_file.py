@@ -3,8 +3,6 @@
 docs/own_hose.md lists every key with its unit; assets/hoses/ has examples.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -44,33 +42,20 @@ class Floor:
 
 @dataclass(frozen=True, kw_only=True)
 class UserHose:
-    """A user's hose as its file describes it.
+    """A user's hose as its file describes it."""
 
-    Attributes:
-        title: one line.
-        spec: the hose.
-        holds: by rising arc length.
-        loads: point forces and moments.
-        gravity: m/s^2.
-        floor: None without one.
-        shape: points that the hose is laid along (m); None for a shape of our choice.
-        duration: simulated time (s); None where only the rest shape is asked for.
-        start: of a motion, one of `STARTS`.
-        errors: wanted errors as fractions of the length, falling.
-        budget: wall time that the comparison may take, about (s).
-    """
-
-    title: str
-    spec: HoseSpec
-    holds: tuple[grasps.Grasp, ...]
-    loads: tuple[PointLoad, ...]
-    gravity: Vector
-    floor: Floor | None
+    title: str  # one line
+    spec: HoseSpec  # the hose
+    holds: tuple[grasps.Grasp, ...]  # by rising arc length
+    loads: tuple[PointLoad, ...]  # point forces and moments
+    gravity: Vector  # m/s^2
+    floor: Floor | None  # None without one
+    # Points that the hose is laid along (m); None for a shape of our choice.
     shape: tuple[Vector, ...] | None
-    duration: float | None
-    start: str
-    errors: tuple[float, ...]
-    budget: float
+    duration: float | None  # simulated time (s); None where only the rest shape is asked for
+    start: str  # of a motion, one of `STARTS`
+    errors: tuple[float, ...]  # wanted errors as fractions of the length, falling
+    budget: float  # wall time that the comparison may take, about (s)
 
     @property
     def moves(self) -> bool:

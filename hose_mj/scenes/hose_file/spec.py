@@ -1,14 +1,11 @@
 """The table [hose] of a user's file: what the hose is made of."""
 
-from __future__ import annotations
-
 from hose_mj.errors import InputError
 from hose_mj.hoses.materials import HOSE_KEYS, MATERIAL_KEYS, find_entry, read_catalogue
 from hose_mj.hoses.spec import Fitting, HoseSpec, complete_section
 from hose_mj.toml_table import TomlTable
 
-LENGTHS = (1e-3, 1e4)
-"""A hose is at least and at most so long (m)."""
+LENGTHS = (1e-3, 1e4)  # a hose is at least and at most so long (m)
 _MAY_BE_NEGATIVE = ("rest_strain", "rest_curvature", "rest_torsion")
 _MAY_BE_ZERO = (
     *("poisson_ratio", "inner_diameter", "contents_density", "damping_time", "drag"),
@@ -22,8 +19,7 @@ _NEEDED = (
     ("outer_radius", "m, or outer_diameter"),
 )
 """What a hose must have in the end, and how a user gives it."""
-_SLENDER = 0.25
-"""The radius is at most this fraction of the length."""
+_SLENDER = 0.25  # the radius is at most this fraction of the length
 
 
 def read_spec(table: TomlTable) -> HoseSpec:
@@ -31,10 +27,8 @@ def read_spec(table: TomlTable) -> HoseSpec:
 
     A ready hose (`like`) and a material (`material`) give numbers first; the numbers that stand in
     the table replace them. Diameters and a material make the stiffnesses and the linear density;
-    those that are stated replace what was made.
-
-    Raises:
-        InputError: an unknown key or name, a number out of range, or too few of them.
+    those that are stated replace what was made. `InputError` is raised for an unknown key or name,
+    a number out of range, or too few of them.
     """
     length = table.number("length", least=LENGTHS[0], most=LENGTHS[1])
     given = _gather(table)

@@ -1,7 +1,5 @@
 """Scenes with robots and a hose, described in MJCF."""
 
-from __future__ import annotations
-
 from typing import Any
 
 __all__ = ["Place", "Robot", "Scene", "find_scene", "list_scenes", "read_scene"]

@@ -8,8 +8,6 @@ one of these, or a module that lies in such a folder:
     yard = "my_package.scenes"
 """
 
-from __future__ import annotations
-
 import os
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -43,25 +41,33 @@ def find_scene(name: str | Path) -> Path:
         return named
     if Path(name).is_file():
         return Path(name)
-    raise InputError("scene", str(name), f"an MJCF file, or one of {', '.join(list_scenes())}")
+    raise _refuse(name)
 
 
 def find_named(name: str | Path) -> Path | None:
-    """Returns the path of a scene by its name; None for a path, or a name that no scene has.
+    """Returns the path of a scene by its name; None for a path.
 
     Raises:
-        InputError: another package's scene that cannot be had.
+        InputError: a name that no scene has, or another package's scene that cannot be had.
     """
+    if not isinstance(name, (str, os.PathLike)):
+        raise InputError("scene", name, "the name of a scene, or an MJCF file")
     path = Path(name)
     if path.suffix == ".xml" or len(path.parts) != 1:
         return None
     own = _list_shipped()
     if str(name) in own:
         return find_assets() / "scenes" / f"{name}.xml"
-    if path.is_file():
+    if path.exists():
         return None
     entry = find_plugins(GROUP, own).get(str(name))
-    return None if entry is None else _find_plugin_file(entry)
+    if entry is None:
+        raise _refuse(name)
+    return _find_plugin_file(entry)
+
+
+def _refuse(name: str | Path) -> InputError:
+    return InputError("scene", str(name), f"an MJCF file, or one of {', '.join(list_scenes())}")
 
 
 def _list_shipped() -> tuple[str, ...]:

@@ -5,8 +5,6 @@ formed UTF-8 without document type or entities, bounded in size, elements and de
 attribute that names a file or a folder leads to a file below the scene's own folder.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from dataclasses import dataclass, field
@@ -17,21 +15,14 @@ from xml.parsers import expat
 
 from hose_mj.errors import InputError
 
-LARGEST_XML = 1_000_000
-"""Bytes of one XML file."""
-LARGEST_ASSET = 20_000_000
-"""Bytes of one mesh, texture or other asset."""
-LARGEST_SCENE = 64_000_000
-"""Bytes of all files together."""
+LARGEST_XML = 1_000_000  # bytes of one XML file
+LARGEST_ASSET = 20_000_000  # bytes of one mesh, texture or other asset
+LARGEST_SCENE = 64_000_000  # bytes of all files together
 MOST_FILES = 200
-MOST_FOLDERS = 8
-"""Folders of assets."""
-MOST_NAMED = 1000
-"""Elements that name a file."""
-MOST_ELEMENTS = 20_000
-"""In all XML files together."""
-DEEPEST = 64
-"""Elements within each other."""
+MOST_FOLDERS = 8  # folders of assets
+MOST_NAMED = 1000  # elements that name a file
+MOST_ELEMENTS = 20_000  # in all XML files together
+DEEPEST = 64  # elements within each other
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
 _XML = ("include", "model")
 _SHOWN = 80
@@ -39,22 +30,16 @@ _SHOWN = 80
 
 @dataclass
 class SceneFiles:
-    """What a scene consists of; filled by `read_files`.
+    """What a scene consists of; filled by `read_files`."""
 
-    Attributes:
-        path: the scene's file, without symbolic links.
-        contents: SHA-256 of each file read, by its path.
-        n_bytes: sizes added up.
-        n_elements: XML elements met.
-        folders: folders in which assets are looked for, relative to the scene's.
-        wanted: what elements name: (where, XML or asset, value, file that names it).
-    """
-
-    path: Path
+    path: Path  # the scene's file, without symbolic links
+    # SHA-256 of each file read, by its path.
     contents: dict[Path, str] = field(default_factory=dict)
-    n_bytes: int = 0
-    n_elements: int = 0
+    n_bytes: int = 0  # sizes added up
+    n_elements: int = 0  # XML elements met
+    # Folders in which assets are looked for, relative to the scene's.
     folders: list[str] = field(default_factory=lambda: [""])
+    # What elements name: (where, XML or asset, value, file that names it).
     wanted: list[tuple[str, bool, str, Path]] = field(default_factory=list)
 
     @property

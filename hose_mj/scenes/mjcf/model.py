@@ -6,8 +6,6 @@ compiled numbers and take one step (`inspect_scene`); what comes back is a recor
 or one `InputError`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -23,17 +21,13 @@ import numpy as np
 from hose_mj.errors import InputError
 from hose_mj.scenes.mjcf.files import shorten
 
-LONGEST = 20
-"""Seconds that the child may take."""
-LARGEST_MEMORY = 4 << 30
-"""Bytes of address space that the child may take."""
+LONGEST = 20  # seconds that the child may take
+LARGEST_MEMORY = 4 << 30  # bytes of address space that the child may take
 _LARGEST_ANSWER = 4_000_000
 MOST = {"nbody": 2000, "ngeom": 5000, "nsite": 5000, "nv": 3000, "nu": 1000, "nnumeric": 1000}
 """Largest counts of a compiled scene."""
-LONGEST_STEP = 0.1
-"""Largest time step (s)."""
-START = "start"
-"""Name of the keyframe, if a scene has one, in which it starts."""
+LONGEST_STEP = 0.1  # largest time step (s)
+START = "start"  # name of the keyframe, if a scene has one, in which it starts
 _OBJECTS = {
     **{"body": "body", "jnt": "joint", "geom": "geom", "site": "site", "actuator": "actuator"},
     **{"tendon": "tendon", "eq": "equality", "key": "key", "numeric": "numeric", "cam": "camera"},

@@ -5,8 +5,6 @@ The conventions (docs/scenes.md): sites `hose_source` and `goal`; robots are bod
 by `<custom>` numerics and a named material. All else is plain MJCF that MuJoCo opens as it is.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import warnings
@@ -30,8 +28,7 @@ __all__ = ["Place", "Robot", "Scene", "find_scene", "list_scenes", "read_scene"]
 SITE = "site"
 SOURCE = "hose_source"
 ATTACH = "hose_attach"
-ORDER = "hose_robots"
-"""Name of the tuple of sites that gives the robots' order, where names do not."""
+ORDER = "hose_robots"  # name of the tuple of sites that gives the robots' order, where names do not
 _SEPARATORS = "/_.-"
 _NUMBER = re.compile(r"\d{1,6}(?=\D*\Z)", re.ASCII)
 GOAL = "goal"
@@ -78,44 +75,27 @@ class Place:
 
 @dataclass(frozen=True)
 class Robot(Place):
-    """A robot, by the site where it holds the hose.
+    """A robot, by the site where it holds the hose."""
 
-    Attributes:
-        name: the prefix of its site ("robot0"), or its body's name where there is none.
-        arc_length: where it holds the hose, from the source (m).
-    """
-
-    name: str
-    arc_length: float
+    name: str  # the prefix of its site ("robot0"), or its body's name where there is none
+    arc_length: float  # where it holds the hose, from the source (m)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene.
+    """A checked scene."""
 
-    Attributes:
-        path: its file.
-        digest: SHA-256 over all its files; equal digests are equal scenes.
-        spec: the hose; arc length 0 is at the source, the tip at its length.
-        robots: along the hose, the tip's first.
-        source: the site that holds the hose's beginning.
-        goal: the site that the tip is to reach.
-        bounds: lowest and highest x, y, z for the robots (m); infinite where there is no bound.
-        friction: Coulomb friction coefficient between the hose and the scene.
-        timestep: MuJoCo's step (s).
-        cell_size: width of the square cells around the source in which robots move (m).
-    """
-
-    path: Path
-    digest: str
-    spec: HoseSpec
-    robots: tuple[Robot, ...]
-    source: Place
-    goal: Place
+    path: Path  # its file
+    digest: str  # SHA-256 over all its files; equal digests are equal scenes
+    spec: HoseSpec  # the hose; arc length 0 is at the source, the tip at its length
+    robots: tuple[Robot, ...]  # along the hose, the tip's first
+    source: Place  # the site that holds the hose's beginning
+    goal: Place  # the site that the tip is to reach
+    # Lowest and highest x, y, z for the robots (m); infinite where there is no bound.
     bounds: tuple[Vector, Vector]
-    friction: float
-    timestep: float
-    cell_size: float
+    friction: float  # Coulomb friction coefficient between the hose and the scene
+    timestep: float  # MuJoCo's step (s)
+    cell_size: float  # width of the square cells around the source in which robots move (m)
 
     def make_spec(self) -> Any:
         """Returns the scene as a new `mujoco.MjSpec`, to be extended by a hose and compiled.
@@ -252,12 +232,10 @@ def find_robots(
 
     The order is that of the sites in the tuple `hose_robots` where the scene has it. Otherwise each
     robot's number is the last number in the prefix of its site or, without one, in its body's name,
-    and the numbers are 0 to N - 1; a single robot needs none. Robot i holds the hose at
-    L (N - i) / N from the source, so that the segments are equal, or at the i-th of `attachments`.
-
-    Raises:
-        InputError: no robots, a robot that cannot move or has two sites, numbers that are not
-            0 to N - 1, attachments that do not fall from the tip to the source.
+    and the numbers are 0 to N - 1; a single robot needs none. Robot i holds the hose at L (N - i) /
+    N from the source, so that the segments are equal, or at the i-th of `attachments`. `InputError`
+    is raised for no robots, a robot that cannot move or has two sites, numbers that are not 0 to N
+    - 1, attachments that do not fall from the tip to the source.
     """
     found = {p.site: p for p in places if _split(p.site, ATTACH) is not None}
     if not found:

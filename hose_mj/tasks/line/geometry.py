@@ -1,7 +1,5 @@
 """Lattice geometry of the line-segment hose, exact in integers, and the tables built from it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ Points 0 .. N - 1 are the robots, tip first, and point N is the source; segment 
 j and j + 1, so robot i ends the segments i - 1 and i.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,31 +17,11 @@ from hose_mj.tasks.stream import Stream, draw_below
 OUT, STRETCH, COLLISION, GOAL, ALL_GOALS = 1, 2, 4, 8, 16
 ENTERING, SWEEPING, ROBOTS = 0, 1, 2
 """Collision rules: entering a held or covered cell, any robot being on one, robots alone."""
-FIXED, RANDOM, ABSENT = 0, 1, 2
-"""Where the goal comes from."""
+FIXED, RANDOM, ABSENT = 0, 1, 2  # where the goal comes from
 
 
 class Line(NamedTuple):
-    """The rules; state: header, x and y of robots 0 .. N - 1, of the source, of the goals.
-
-    Attributes:
-        n_robots: N.
-        single_agent: whether one agent moves all robots with actions 4 robot + direction.
-        own_goals: whether each robot has a goal of its own (non-cooperative task).
-        cancelling: whether impossible moves are cancelled (the author's rule) before the events.
-        collision: ENTERING, SWEEPING or ROBOTS.
-        half_width: h; the grid is [-h, h]^2.
-        largest_square: square of the longest segment, L_s^2 rounded down.
-        offsets: offsets allowed between neighbours (k, 2).
-        offset_table: their numbers, see `geometry.make_offset_table`.
-        cover_reach, cover_table: m and the table of `geometry.make_cover_table`.
-        random_start: whether the robots' first cells are drawn from the feasible set.
-        starts: their first cells otherwise (N, 2).
-        goal_mode: FIXED, RANDOM or ABSENT.
-        goals: the goals where they are fixed (n_goals, 2).
-        goal_cells: cells that the tip can reach (m, 2).
-        distance_table, direction_table: d_g and theta_g by G - P, (0, 0) in the middle.
-    """
+    """The rules; state: header, x and y of robots 0 .. N - 1, of the source, of the goals."""
 
     n_agents: int
     n_actions: int
@@ -53,22 +31,24 @@ class Line(NamedTuple):
     success: int
     shared: int
     reward_table: Floats
-    n_robots: int
-    single_agent: bool
-    own_goals: bool
-    cancelling: bool
-    collision: int
-    half_width: int
-    largest_square: int
-    offsets: Integers
-    offset_table: Integers
+    n_robots: int  # N
+    single_agent: bool  # whether one agent moves all robots with actions 4 robot + direction
+    own_goals: bool  # whether each robot has a goal of its own (non-cooperative task)
+    cancelling: bool  # whether impossible moves are cancelled (the author's rule) before the events
+    collision: int  # ENTERING, SWEEPING or ROBOTS
+    half_width: int  # h; the grid is [-h, h]^2
+    largest_square: int  # square of the longest segment, L_s^2 rounded down
+    offsets: Integers  # offsets allowed between neighbours (k, 2)
+    offset_table: Integers  # their numbers, see `geometry.make_offset_table`
+    # cover_reach, cover_table: m and the table of `geometry.make_cover_table`.
     cover_reach: int
     cover_table: Bytes
-    random_start: bool
-    starts: Integers
-    goal_mode: int
-    goals: Integers
-    goal_cells: Integers
+    random_start: bool  # whether the robots' first cells are drawn from the feasible set
+    starts: Integers  # their first cells otherwise (N, 2)
+    goal_mode: int  # FIXED, RANDOM or ABSENT
+    goals: Integers  # the goals where they are fixed (n_goals, 2)
+    goal_cells: Integers  # cells that the tip can reach (m, 2)
+    # distance_table, direction_table: d_g and theta_g by G - P, (0, 0) in the middle.
     distance_table: Integers
     direction_table: Integers
 

@@ -1,7 +1,5 @@
 """The line-segment hose task (thesis B.2): settings, and the task made from them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -20,11 +18,7 @@ from hose_mj.tasks.variables import Variable
 
 Cell = tuple[int, int]
 
-COLLISIONS = {
-    "entering": rules.ENTERING,
-    "sweeping": rules.SWEEPING,
-    "robots": rules.ROBOTS,
-}
+COLLISIONS = {"entering": rules.ENTERING, "sweeping": rules.SWEEPING, "robots": rules.ROBOTS}
 GOAL_MODES = {"random": rules.RANDOM, "none": rules.ABSENT}
 VIOLATIONS = ("out", "stretch", "collision")
 N_DISTANCES, N_SQUARES = 24, 256
@@ -36,40 +30,30 @@ DIRECTIONS = ("up", "down", "left", "right")
 class LineSettings:
     """N robots that pull a hose of straight segments over a grid (thesis B.2).
 
-    Attributes:
-        n_robots: N, robot 0 at the tip.
-        hose_length: L_hose in cells; a segment is at most L_s = L_hose / N long.
-        half_width: h; the cells are [-h, h]^2 around the source.
-        own_goals: each robot has a goal of its own (the non-cooperative task).
-        single_agent: one agent moves all robots, one at a time, with 4 N actions (chapter 5).
-        start: the robots' first cells, tip first, or "random" for the uniform feasible ones.
-        goal: the tip's goal or with `own_goals` each robot's, "random", or "none".
-        collision: what a robot collides with: by "entering" a cell that another robot holds or the
-            hose covers; also when the hose is "sweeping" over any robot; or "robots" alone.
-        move_rule: whether an impossible move is an event in the state after it ("simultaneous", for
-            joint moves) or is left out ("cancelling", the author's later rule).
-        violations_end: whether an event that breaks a constraint ends the episode.
-        goal_reward: for the goal.
-        violation_reward: for each broken constraint.
-        step_limit: moves of single robots after which an episode is cut off.
-
     Raises:
         InputError: a value outside its valid set; the robots' cells are checked by `make_line`.
     """
 
-    n_robots: int = 4
-    hose_length: int = 16
-    half_width: int = 10
-    own_goals: bool = False
+    n_robots: int = 4  # N, robot 0 at the tip
+    hose_length: int = 16  # L_hose in cells; a segment is at most L_s = L_hose / N long
+    half_width: int = 10  # h; the cells are [-h, h]^2 around the source
+    own_goals: bool = False  # each robot has a goal of its own (the non-cooperative task)
+    # One agent moves all robots, one at a time, with 4 N actions (chapter 5).
     single_agent: bool = False
+    # The robots' first cells, tip first, or "random" for the uniform feasible ones.
     start: tuple[Cell, ...] | Literal["random"] = "random"
+    # The tip's goal or with `own_goals` each robot's, "random", or "none".
     goal: Cell | tuple[Cell, ...] | Literal["random", "none"] = "random"
+    # What a robot collides with: by "entering" a cell that another robot holds or the hose covers;
+    # also when the hose is "sweeping" over any robot; or "robots" alone.
     collision: Literal["entering", "sweeping", "robots"] = "entering"
+    # Whether an impossible move is an event in the state after it ("simultaneous", for joint moves)
+    # or is left out ("cancelling", the author's later rule).
     move_rule: Literal["simultaneous", "cancelling"] = "simultaneous"
-    violations_end: bool = True
-    goal_reward: float = 100.0
-    violation_reward: float = -50.0
-    step_limit: int = 400
+    violations_end: bool = True  # whether an event that breaks a constraint ends the episode
+    goal_reward: float = 100.0  # for the goal
+    violation_reward: float = -50.0  # for each broken constraint
+    step_limit: int = 400  # moves of single robots after which an episode is cut off
 
     def __post_init__(self) -> None:
         check_integer("n_robots", self.n_robots, 1, 8)

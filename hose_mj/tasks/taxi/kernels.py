@@ -1,7 +1,5 @@
 """The multi-agent taxi problem (thesis B.3), compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from hose_mj.jit import inlined, jitable
@@ -24,14 +22,6 @@ class Taxi(NamedTuple):
     (n_taxis + 1). Where a single agent chooses for all taxis, its action has the last taxi's in the
     lowest digit of base 6, and the events of taxi k are shifted by 2 k bits, the goal by as many as
     the last taxi's.
-
-    Attributes:
-        n_taxis: number of taxis.
-        single_agent: whether one agent chooses for all taxis.
-        walls: 1 where a step from a cell up, right, down, left meets a wall (WIDTH^2, 4).
-        starts: the taxis' first cells (n_taxis,).
-        origins: where the passengers wait (n_passengers,).
-        destinations: where they want to go (n_passengers,).
     """
 
     n_agents: int
@@ -42,12 +32,12 @@ class Taxi(NamedTuple):
     success: int
     shared: int
     reward_table: Floats
-    n_taxis: int
-    single_agent: bool
-    walls: Integers
-    starts: Integers
-    origins: Integers
-    destinations: Integers
+    n_taxis: int  # number of taxis
+    single_agent: bool  # whether one agent chooses for all taxis
+    walls: Integers  # 1 where a step from a cell up, right, down, left meets a wall (WIDTH^2, 4)
+    starts: Integers  # the taxis' first cells (n_taxis,)
+    origins: Integers  # where the passengers wait (n_passengers,)
+    destinations: Integers  # where they want to go (n_passengers,)
 
 
 @kernels.reset.register(Taxi)

@@ -1,7 +1,5 @@
 """The multi-agent taxi problem (thesis B.3): map, settings, and the task made from them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -29,26 +27,18 @@ FLAGS = ("up", "down", "left", "right")
 class TaxiSettings:
     """Taxis that carry passengers on Dietterich's 5 x 5 map (thesis B.3).
 
-    Attributes:
-        starts: first cells (row, column) of one or two taxis.
-        passengers: one to three pairs of stations (R, G, Y, B), from and to.
-        single_agent: one agent chooses for all taxis at once (section 5.5.2).
-        goal_reward: for all, when every passenger is delivered.
-        collision_reward: for running into a wall or the other taxi.
-        misplaced_reward: for picking or dropping where it does nothing.
-        step_limit: actions of single taxis after which an episode is cut off.
-
     Raises:
         InputError: a value outside its valid set, or taxis that start on one cell.
     """
 
-    starts: tuple[Cell, ...] = ((2, 2), (2, 1))
+    starts: tuple[Cell, ...] = ((2, 2), (2, 1))  # first cells (row, column) of one or two taxis
+    # One to three pairs of stations (R, G, Y, B), from and to.
     passengers: tuple[tuple[str, str], ...] = (("R", "B"), ("G", "Y"))
-    single_agent: bool = False
-    goal_reward: float = 100.0
-    collision_reward: float = -10.0
-    misplaced_reward: float = 0.0
-    step_limit: int = 2000
+    single_agent: bool = False  # one agent chooses for all taxis at once (section 5.5.2)
+    goal_reward: float = 100.0  # for all, when every passenger is delivered
+    collision_reward: float = -10.0  # for running into a wall or the other taxi
+    misplaced_reward: float = 0.0  # for picking or dropping where it does nothing
+    step_limit: int = 2000  # actions of single taxis after which an episode is cut off
 
     def __post_init__(self) -> None:
         if not isinstance(self.starts, tuple) or not 1 <= len(self.starts) <= 2:

@@ -1,7 +1,5 @@
 """The corridor of Example 1 (thesis section 6.4) and the maze of Table 5.1, compiled."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from hose_mj.jit import inlined, jitable
@@ -14,15 +12,7 @@ LEFT, RIGHT = 0, 1
 
 
 class Corridor(NamedTuple):
-    """The corridor's rules; state: header, then the robots' cells.
-
-    Attributes:
-        n_cells: length of the corridor.
-        goal: the goal's cell.
-        starts: the robots' first cells (n_agents,).
-        goal_ends_move: whether reaching the goal ends the episode at once, not the cycle.
-        winner: who gets a cell that both enter at once, as in `joint`.
-    """
+    """The corridor's rules; state: header, then the robots' cells."""
 
     n_agents: int
     n_actions: int
@@ -32,11 +22,11 @@ class Corridor(NamedTuple):
     success: int
     shared: int
     reward_table: Floats
-    n_cells: int
-    goal: int
-    starts: Integers
-    goal_ends_move: bool
-    winner: int
+    n_cells: int  # length of the corridor
+    goal: int  # the goal's cell
+    starts: Integers  # the robots' first cells (n_agents,)
+    goal_ends_move: bool  # whether reaching the goal ends the episode at once, not the cycle
+    winner: int  # who gets a cell that both enter at once, as in `joint`
 
 
 @kernels.reset.register(Corridor)

@@ -23,28 +23,20 @@ WINNERS = {"first": joint.FIRST, "second": joint.SECOND, "neither": joint.NEITHE
 class CorridorSettings:
     """Two robots in a corridor of cells 0 .. n_cells - 1 (Example 1, section 6.4).
 
-    Attributes:
-        n_cells: length of the corridor.
-        goal: the goal's cell.
-        starts: first cells of the two robots.
-        goal_ends: what reaching the goal ends: the "cycle" of turns (Table 6.2) or the "move".
-        winner: who gets a cell that both enter at once (Table 6.1 allows "first" and "second").
-        goal_reward: for both, when a robot reaches the goal.
-        collision_reward: for both, when a robot hits a wall or the other robot.
-        step_limit: moves of single robots after which an episode is cut off.
-
     Raises:
         InputError: a value outside its range, or robots that start together or on the goal.
     """
 
-    n_cells: int = 3
-    goal: int = 1
-    starts: tuple[int, int] = (0, 2)
+    n_cells: int = 3  # length of the corridor
+    goal: int = 1  # the goal's cell
+    starts: tuple[int, int] = (0, 2)  # first cells of the two robots
+    # What reaching the goal ends: the "cycle" of turns (Table 6.2) or the "move".
     goal_ends: Literal["cycle", "move"] = "cycle"
+    # Who gets a cell that both enter at once (Table 6.1 allows "first" and "second").
     winner: Literal["first", "second", "neither"] = "first"
-    goal_reward: float = 100.0
-    collision_reward: float = -10.0
-    step_limit: int = 100
+    goal_reward: float = 100.0  # for both, when a robot reaches the goal
+    collision_reward: float = -10.0  # for both, when a robot hits a wall or the other robot
+    step_limit: int = 100  # moves of single robots after which an episode is cut off
 
     def __post_init__(self) -> None:
         check_integer("n_cells", self.n_cells, 3, 1000)
@@ -99,24 +91,17 @@ def _make_rewards(settings: CorridorSettings | MazeSettings) -> dict[str, dict[s
 class MazeSettings:
     """One robot in the rooms of Table 5.1: 4 x 2 cells, walls above (0, 0) and (2, 0).
 
-    Attributes:
-        actions: "all" four directions, or "up" alone as in the table.
-        goal: cell (x, y) whose entry ends the episode; y counts upwards.
-        start: first cell (x, y), or "random" for any but the goal's.
-        goal_reward: for entering the goal's cell.
-        collision_reward: -k of the table.
-        step_limit: moves after which an episode is cut off.
-
     Raises:
         InputError: a value outside its range, or a robot that starts on the goal.
     """
 
-    actions: Literal["all", "up"] = "all"
-    goal: tuple[int, int] = (0, 1)
+    actions: Literal["all", "up"] = "all"  # "all" four directions, or "up" alone as in the table
+    goal: tuple[int, int] = (0, 1)  # cell (x, y) whose entry ends the episode; y counts upwards
+    # First cell (x, y), or "random" for any but the goal's.
     start: tuple[int, int] | Literal["random"] = "random"
-    goal_reward: float = 100.0
-    collision_reward: float = -10.0
-    step_limit: int = 100
+    goal_reward: float = 100.0  # for entering the goal's cell
+    collision_reward: float = -10.0  # -k of the table
+    step_limit: int = 100  # moves after which an episode is cut off
 
     def __post_init__(self) -> None:
         check_choice("actions", self.actions, ("all", "up"))

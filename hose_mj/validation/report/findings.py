@@ -1,7 +1,5 @@
 """Sentences and cells that say what was found about a user's hose."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from hose_mj.recording.palette import name_model

@@ -4,8 +4,6 @@ The page says what was measured in the order a physicist asks for it; the words 
 measurement stand in texts.md.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,8 +37,7 @@ from hose_mj.validation.user_hose.study import UserHoseStudy
 
 TIMES = "\u00d7"
 HEADER = ["model", "resolution", "step", "scheme", "clamp", "error", "wall s / sim s", "fallbacks"]
-_STATIC_COLUMNS = (0, 1, 2, 5, 6)
-"""Columns of case and `HEADER` that a static case fills."""
+_STATIC_COLUMNS = (0, 1, 2, 5, 6)  # columns of case and `HEADER` that a static case fills
 _RATIO_HEADER = ["case", "error", "against", "GEDS is cheaper by", "GEDS at", "the other at"]
 _RATIO_CAPTION = (
     "Wall time at equal error, every model at its cheapest setting of the grid; like "

@@ -1,7 +1,5 @@
 """Pictures and scenes of `hose-mj compare`: what is drawn of which case, with which words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 
@@ -20,10 +18,8 @@ from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import RunResult
 from hose_mj.validation.study import SHOWN_WITHIN, Study
 
-Pictures = dict[str, bytes]
-"""PNG by file name without its suffix."""
-N_SNAPSHOTS = 6
-"""Instants drawn into one picture of shapes."""
+Pictures = dict[str, bytes]  # PNG by file name without its suffix
+N_SNAPSHOTS = 6  # instants drawn into one picture of shapes
 PLANAR = tuple(model for model, entry in MODELS.items() if entry.is_planar)
 """Peers that move in a plane, and are held against GEDS in a plane."""
 PARAMETERS = {
@@ -33,10 +29,8 @@ PARAMETERS = {
 }
 """Family -> what its ids put before the parameter, and what plots put there."""
 FANS = ("heavy-cantilever", "tip-load", "end-moment")
-HERO = "released-rod"
-"""The case of the overview."""
-COMMITTED = "cable (committed)"
-"""The series of the cable's committed runs."""
+HERO = "released-rod"  # the case of the overview
+COMMITTED = "cable (committed)"  # the series of the cable's committed runs
 _N_DIRECTIONS = 96
 """Directions in which the farthest point of an obstacle is sought for its outline."""
 

@@ -1,7 +1,5 @@
 """What a user's hose asked for: how fine each model must be, and how far its best run stays."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,46 +10,27 @@ from hose_mj.validation.run import RunResult
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest setting of a model within a wanted error; Nones where no setting reached it.
+    """The cheapest setting of a model within a wanted error; Nones where no setting reached it."""
 
-    Attributes:
-        at_error: wanted, as a fraction of the length.
-        model: its id.
-        planar: whether GEDS ran in a plane.
-        setting: its label.
-        resolution: control points or segments.
-        timestep: s; None for a rest shape.
-        error: reached, as a fraction of the length.
-        wall_s_per_sim_s: wall time per simulated second; None for a rest shape.
-    """
-
-    at_error: float
-    model: str
-    planar: bool
-    setting: str | None = None
-    resolution: int | None = None
-    timestep: float | None = None
-    error: float | None = None
-    wall_s_per_sim_s: float | None = None
+    at_error: float  # wanted, as a fraction of the length
+    model: str  # its id
+    planar: bool  # whether GEDS ran in a plane
+    setting: str | None = None  # its label
+    resolution: int | None = None  # control points or segments
+    timestep: float | None = None  # s; None for a rest shape
+    error: float | None = None  # reached, as a fraction of the length
+    wall_s_per_sim_s: float | None = None  # wall time per simulated second; None for a rest shape
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """The distance at which the best run of a model stays from the converged hose.
+    """The distance at which the best run of a model stays from the converged hose."""
 
-    Attributes:
-        model: its id.
-        clamp_corrected: as in `Setting`.
-        error: largest distance as a fraction of the length.
-        distance: the same in metres.
-        setting: label of the run.
-    """
-
-    model: str
-    clamp_corrected: bool | None
-    error: float
-    distance: float
-    setting: str
+    model: str  # its id
+    clamp_corrected: bool | None  # as in `Setting`
+    error: float  # largest distance as a fraction of the length
+    distance: float  # the same in metres
+    setting: str  # label of the run
 
 
 def list_answers(

@@ -1,7 +1,5 @@
 """A user's hose as a case of `hose-mj compare`, and the smooth line along which it is laid."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,15 +18,12 @@ from hose_mj.hoses.registry import make_hose
 from hose_mj.scenes.hose_file.hose_file import UserHose
 from hose_mj.validation.case import Case, Motion
 
-Line = Callable[[Array], Array]
-"""Positions (k, 3) over arc lengths (k,), m."""
+Line = Callable[[Array], Array]  # positions (k, 3) over arc lengths (k,), m
 CASE_ID = "own-hose"
-N_PROBES = 17
-"""Places along the hose at which models are compared."""
+N_PROBES = 17  # places along the hose at which models are compared
 REST_POINTS = 48
 """Control points of the rest shape from which all models start, times `compute_fineness`."""
-_FIRST_MODE = 3.5
-"""omega L^2 sqrt(rho A / EI) of a clamped-free beam."""
+_FIRST_MODE = 3.5  # omega L^2 sqrt(rho A / EI) of a clamped-free beam
 _PUSH = 1e-3
 """Amount, as a fraction of the length, by which the hose is bent aside before it comes to rest."""
 _STEPS_TO_REST = 400
@@ -36,10 +31,8 @@ _FLAT = 1e-6
 _PAUSE = 0.04
 _FEWEST, _MOST = 25, 500
 """Samples of a motion: about one per `_PAUSE` seconds, but not fewer or more than these."""
-_N = 200
-"""Points of a piece between two holds."""
-_CHORD = 1e-4
-"""Chords of this fraction of the length tell how a line bends where it begins."""
+_N = 200  # points of a piece between two holds
+_CHORD = 1e-4  # chords of this fraction of the length tell how a line bends where it begins
 _CLOSED = 1e-3
 """Ends no further apart than this fraction of the length between them count as one place."""
 _AXES = np.eye(3)

@@ -1,7 +1,5 @@
 """Runs a user's hose within a budget: how far the models disagree, how fine each must be."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -52,32 +50,21 @@ from hose_mj.validation.user_hose.case import (
 
 KNOWN_MODELS = ("geds", "cable", "flex")
 """Models that a user's hose is compared with, those of them that there are."""
-REFERENCE_STEP = 2e-3
-"""The first reference takes steps of about this length (s)."""
-MOST_REFERENCE_POINTS = 192
-"""Times `compute_fineness`."""
+REFERENCE_STEP = 2e-3  # the first reference takes steps of about this length (s)
+MOST_REFERENCE_POINTS = 192  # times `compute_fineness`
 _TIGHTER = 5.0
 """A reference is to be this many times closer to its limit than the smallest wanted error."""
 _SHARE_OF_REFERENCE, _SHARE_OF_RUN = 0.3, 0.08
 """Of the budget: for the references, and for a single run."""
-_GROWTH = 8.0
-"""A rest shape takes a chain of twice as many segments about so many times as long."""
-_EXTRA = 0.1
-"""Of the budget: what timing may take beyond it."""
-_ENOUGH = 2
-"""Resolutions within the smallest wanted error, after which finer ones are left out."""
-FEWEST_SEGMENTS = 10
-"""The coarsest chain that is run."""
-_SOME_SPIN = 1e-3
-"""A spin that tells whether a model's clamps turn (rad)."""
+_GROWTH = 8.0  # a rest shape takes a chain of twice as many segments about so many times as long
+_EXTRA = 0.1  # of the budget: what timing may take beyond it
+_ENOUGH = 2  # resolutions within the smallest wanted error, after which finer ones are left out
+FEWEST_SEGMENTS = 10  # the coarsest chain that is run
+_SOME_SPIN = 1e-3  # a spin that tells whether a model's clamps turn (rad)
 GRID = Grid(
     static={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40), "flex": (10, 20, 40)},
     dynamic={"geds": (8, 12, 16, 24, 32), "cable": (10, 20, 40, 80), "flex": (10, 20, 40, 80)},
-    schemes={
-        "geds": ("bdf2", "bdf2, planar"),
-        "cable": ("euler", "rk4"),
-        "flex": ("discrete",),
-    },
+    schemes={"geds": ("bdf2", "bdf2, planar"), "cable": ("euler", "rk4"), "flex": ("discrete",)},
     smallest_geds_step=5e-4,
     longest_ladder=4,
     longest_flex_ladder=4,
@@ -94,23 +81,16 @@ GEDS's control points are these times `compute_fineness`.
 
 @dataclass
 class UserHoseStudy:
-    """The findings about a user's hose.
+    """The findings about a user's hose."""
 
-    Attributes:
-        hose: what the file says.
-        result: all runs, against the hose as it is (`stretchable`).
-        stretch: largest distance between the hose as it is and one that does not stretch, as a
-            fraction of the length: what no inextensible model can get below; None without one.
-        refused: why a model did not run, by model.
-        answers: by wanted error and model.
-        disagreements: by model, and by clamp for the chains.
-    """
-
-    hose: UserHose
-    result: CaseResult
+    hose: UserHose  # what the file says
+    result: CaseResult  # all runs, against the hose as it is (`stretchable`)
+    # Largest distance between the hose as it is and one that does not stretch, as a fraction of the
+    # length: what no inextensible model can get below; None without one.
     stretch: float | None = None
-    refused: dict[str, str] = field(default_factory=dict)
-    answers: list[Answer] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)  # why a model did not run, by model
+    answers: list[Answer] = field(default_factory=list)  # by wanted error and model
+    # By model, and by clamp for the chains.
     disagreements: list[Disagreement] = field(default_factory=list)
 
     @property

@@ -12,12 +12,13 @@ does in `hose_learning.rules`, with functions that are `hose_mj.jit.jitable`, as
 folder do. The command line trains it, and the contract tests hold it to what all learners do.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 from typing import Any, Literal, cast
 
 from numpy.random import Generator
@@ -27,7 +28,7 @@ from hose_learning.presets import make_modules
 from hose_learning.records import Memory
 from hose_learning.settings import LearnerSettings
 from hose_mj.errors import InputError, check_choice
-from hose_mj.plugins import find_plugins, load_plugin
+from hose_mj.plugins import find_plugins, load_plugin, load_plugins
 from hose_mj.tasks.task import Task
 
 GROUP = "hose_learning.learners"
@@ -36,154 +37,43 @@ Schedule = Literal["turns", "joint"]
 
 @dataclass(frozen=True, kw_only=True)
 class LearnerEntry:
-    """Where a learner is and what it is.
+    """Where a learner is and what it is."""
 
-    Attributes:
-        module: where it is, imported when it is made.
-        factory: the function there that makes it.
-        schedule: whether its agents move in "turns" (or alone) or jointly.
-        section: where the thesis has it, or whose it is.
-        description: one line for listings.
-        values, vetoes: its modules by default, see `hose_learning.presets`.
-        settings: fields of `LearnerSettings` that differ from its defaults.
-        composes: whether its greedy policies are composed into joint moves (section 6.4).
-        refresh_moves: moves after which its module's `refresh` is called, in plain Python; 0 for
-            never.
-    """
-
-    module: str
-    schedule: Schedule
-    section: str
-    description: str
-    factory: str = "make"
+    module: str  # where it is, imported when it is made
+    section: str  # where the thesis has it, or whose it is
+    description: str  # one line for listings
+    schedule: Schedule = "turns"  # whether its agents move in "turns" (or alone) or jointly
+    factory: str = "make"  # the function there that makes it
+    # values, vetoes: its modules by default, see `hose_learning.presets`.
     values: str = "goal"
     vetoes: str = "none"
+    # Fields of `LearnerSettings` that differ from its defaults.
     settings: Mapping[str, Any] = field(default_factory=dict)
+    # Whether its greedy policies are composed into joint moves (section 6.4).
     composes: bool = False
+    # Moves after which its module's `refresh` is called, in plain Python; 0 for never.
     refresh_moves: int = 0
 
 
-def _turns(file: str, section: str, description: str, **rest: Any) -> LearnerEntry:
-    module = f"hose_learning.learners.{file}"
-    shared = {"schedule": "turns", "section": section, "description": description}
-    return LearnerEntry(module=module, **{**shared, **rest})
+def _read_own() -> dict[str, LearnerEntry]:
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    return {
+        id: LearnerEntry(**{**entry, "module": f"{GROUP}.{entry['module']}"})
+        for id, entry in tomllib.loads(text).items()
+    }
 
 
-def _joint(file: str, section: str, description: str) -> LearnerEntry:
-    return _turns(file, section, description, schedule="joint", values="monolithic")
-
-
-LEARNERS: dict[str, LearnerEntry] = {
-    "q-learning": _turns(
-        "round_robin",
-        "Algorithm 3.1",
-        "one table of all rewards; with several agents each learns alone",
-        values="monolithic",
-    ),
-    "modular-q": _turns(
-        "round_robin",
-        "Algorithm 4.1",
-        "a value module for the goal and for each constraint, and a mediator",
-        factory="make_cycle_sum",
-        vetoes="values",
-    ),
-    "thresholded-msav": _turns(
-        "round_robin",
-        "4.5, eq. 4.4",
-        "modular Q-learning where values below a threshold veto an action",
-        factory="make_cycle_sum",
-        vetoes="thresholds",
-    ),
-    "safe-msav": _turns(
-        "round_robin",
-        "5.3, eq. 5.2",
-        "a goal module, and modules that veto what once broke a constraint",
-        factory="make_cycle_sum",
-        vetoes="modules",
-    ),
-    "rr-q": _turns(
-        "central",
-        "Algorithm 6.1",
-        "one learner for everybody's turn, whose turn it is being part of the state",
-        values="monolithic",
-    ),
-    "d-rr-ql-messages": _turns(
-        "messages",
-        "Algorithm 6.2",
-        "a table for each agent, which learns from its successor's best value",
-        values="monolithic",
-        composes=True,
-    ),
-    "d-rr-ql": _turns(
-        "round_robin",
-        "Algorithm 6.3",
-        "each agent learns alone from whole cycles of turns, with vetoes",
-        vetoes="modules",
-        composes=True,
-    ),
-    "d-rr-ql-traces": _turns(
-        "traces",
-        "author's experiment of 2015",
-        "d-rr-ql with optimistic replacing traces",
-        vetoes="modules",
-        settings={"learning_rate": 0.1},
-        composes=True,
-    ),
-    "usap": _turns(
-        "usap",
-        "8.2, Algorithms 8.1, 8.3",
-        "a classifier predicts what would break a constraint, and vetoes it",
-        refresh_moves=1000,
-    ),
-    "risk-q": _turns(
-        "risk_q", "3.2.1 (Geibel)", "a second table learns the risk of breaking a constraint"
-    ),
-    "d-ql": _joint(
-        "distributed_q",
-        "3.6.1 (Lauer and Riedmiller)",
-        "agents that move at once, each of whom takes the best that ever followed",
-    ),
-    "team-q": _joint(
-        "team_q", "3.1, team learning", "one table over the joint actions of all agents"
-    ),
-    "hysteretic-q": _joint(
-        "hysteretic_q",
-        "3.6.1 (Matignon et al.)",
-        "d-ql that forgets slowly: values fall by a smaller rate than they rise",
-    ),
-    "distributed-rewards": _joint(
-        "distributed_rewards",
-        "3.6.1 (Schneider et al.)",
-        "each agent learns from its neighbours' rewards too",
-    ),
-    "distributed-values": _joint(
-        "distributed_values",
-        "3.6.1 (Schneider et al.)",
-        "each agent learns from its neighbours' values too",
-    ),
-    "coordinated-q": _joint(
-        "coordinated_q",
-        "3.6.3 (Guestrin et al.)",
-        "local values over a coordination graph, one error for all of them",
-    ),
-    "sparse-q": _joint(
-        "sparse_q",
-        "3.6.3 (Kok and Vlassis)",
-        "local values over a coordination graph, an error for each edge or agent",
-    ),
-}
-"""Those of this package."""
+LEARNERS = _read_own()  # those of this package, in catalog.toml
 
 
 def list_learners() -> dict[str, LearnerEntry]:
     """Returns all learners by id, those of other packages last.
 
     Raises:
-        InputError: an entry point of another package takes a name of ours, cannot be imported, or
-            is no `LearnerEntry`.
+        InputError: an entry point of another package takes a name of ours.
     """
-    plugins = find_plugins(GROUP, LEARNERS)
-    return {**LEARNERS, **{id: load_plugin(point, LearnerEntry) for id, point in plugins.items()}}
+    load = partial(load_plugin, kind=LearnerEntry)
+    return {**LEARNERS, **load_plugins(find_plugins(GROUP, LEARNERS), load)}
 
 
 def find_learner(id: str) -> LearnerEntry:

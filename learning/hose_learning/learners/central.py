@@ -4,8 +4,6 @@ One learner chooses for whoever's turn it is: the turn is one more variable of t
 follows a move is the next agent's best value.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ The team's values are a sum over the edges of a coordination graph, the neighbou
 default. All edges learn from the team's one TD error.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator

@@ -4,8 +4,6 @@ Each edge {i, j} has values Q_ij(s, a_i, a_j) of its own for each module; their 
 stands for the team's Q(s, a). An edge sees what the first of its two agents sees.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from hose_learning.learners import solvers
@@ -22,11 +20,7 @@ from hose_mj.tasks.kernels import Integers
 from hose_mj.tasks.stream import draw_unit
 from hose_mj.tasks.task import Task
 
-OPTIONS: dict[str, float | str] = {
-    "graph": "chain",
-    "solver": "variable-elimination",
-    "rounds": 20,
-}
+OPTIONS: dict[str, float | str] = {"graph": "chain", "solver": "variable-elimination", "rounds": 20}
 """The edges: "chain" (neighbours along the hose), "complete", or pairs of agents as in "0-1 0-2";
 one of `solvers.SOLVERS`; starts of coordinate ascent, or most rounds of messages of max-plus."""
 

@@ -4,8 +4,6 @@ Each agent knows its own actions alone and takes the best that ever followed one
 follows it: its teammates will find their part. Values only rise, so there is no learning rate.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -29,15 +27,10 @@ paper's agents agree where several joint actions are best. The thesis leaves it 
 
 
 class DistributedQ(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discount: gamma.
-        keeps_policy: see `OPTIONS`; the action, counted from 1, then stands last in each row.
-    """
-
-    discount: float
-    keeps_policy: bool
+    discount: float  # gamma
+    keeps_policy: bool  # see `OPTIONS`; the action, counted from 1, then stands last in each row
 
 
 def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:

@@ -4,8 +4,6 @@ Each agent learns alone, from a weighted mean of its own reward and those of its
 the hose.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator
@@ -22,15 +20,10 @@ from hose_mj.tasks.task import Task
 
 
 class DistributedRewards(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discount: gamma.
-        weights: f(i, j), what agent j weighs for agent i (n_agents, n_agents).
-    """
-
-    discount: float
-    weights: Floats
+    discount: float  # gamma
+    weights: Floats  # f(i, j), what agent j weighs for agent i (n_agents, n_agents)
 
 
 def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:

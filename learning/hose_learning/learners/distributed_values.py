@@ -4,8 +4,6 @@ Each agent learns from its own reward and a weighted mean of what it and its nei
 hose expect from then on; so rewards reach all agents, the later the farther they are away.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator
@@ -22,15 +20,10 @@ from hose_mj.tasks.task import Task
 
 
 class DistributedValues(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discount: gamma.
-        weights: f(i, j), what agent j weighs for agent i (n_agents, n_agents).
-    """
-
-    discount: float
-    weights: Floats
+    discount: float  # gamma
+    weights: Floats  # f(i, j), what agent j weighs for agent i (n_agents, n_agents)
 
 
 def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:

@@ -4,8 +4,6 @@ Independent learners that trust good news more than bad news, which may be a tea
 a value rises with the learning rate alpha and falls with a smaller one, beta.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator

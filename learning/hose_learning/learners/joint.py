@@ -1,7 +1,5 @@
 """What the learners of joint moves share: how agents choose, and what a joint move was worth."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Each agent has a table of its own. The one whose turn comes tells its predecesso
 that it sees, and with this message the predecessor learns.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

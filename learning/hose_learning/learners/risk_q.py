@@ -6,8 +6,6 @@ xi Q(s, a) - Q_risk(s, a); xi is 0 until the risk has settled, then it rises for
 stays below a bound omega.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 
@@ -35,14 +33,10 @@ AVERAGED_EPISODES = 100
 
 
 class Risk(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discounts: gamma^k for the goal, 1 for the risk (2, n_agents + 1).
-        risk_bound, xi_step, xi_most, settle_episodes: see `OPTIONS`.
-    """
-
-    discounts: Floats
+    discounts: Floats  # gamma^k for the goal, 1 for the risk (2, n_agents + 1)
+    # risk_bound, xi_step, xi_most, settle_episodes: see `OPTIONS`.
     risk_bound: float
     xi_step: float
     xi_most: float

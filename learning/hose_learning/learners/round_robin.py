@@ -4,8 +4,6 @@ Each agent learns alone: what follows its move until its turn comes back, a cycl
 state it then sees, is one step of its own Q-learning.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

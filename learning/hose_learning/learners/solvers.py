@@ -8,8 +8,6 @@ All solvers work on a `Graph` and a `Scratch`, whose `values` begin with the pay
 `maximize` is compiled for itself, so that it is found on disk by every learner and task.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,15 +21,9 @@ from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.stream import Stream
 
 ELIMINATION, ASCENT, MAX_PLUS = 0, 1, 2
-SOLVERS = {
-    "variable-elimination": ELIMINATION,
-    "coordinate-ascent": ASCENT,
-    "max-plus": MAX_PLUS,
-}
-MOST_SWEEPS = 1000
-"""An ascent ends much earlier; but rounding could let it go round in circles."""
-LARGEST_ELIMINATION = 10**6
-"""Most numbers that variable elimination may write down."""
+SOLVERS = {"variable-elimination": ELIMINATION, "coordinate-ascent": ASCENT, "max-plus": MAX_PLUS}
+MOST_SWEEPS = 1000  # an ascent ends much earlier; but rounding could let it go round in circles
+LARGEST_ELIMINATION = 10**6  # most numbers that variable elimination may write down
 
 
 class Graph(NamedTuple):
@@ -39,33 +31,21 @@ class Graph(NamedTuple):
 
     Functions of some agents' actions are numbered: first the edges' payoffs, then what each step of
     the elimination leaves.
-
-    Attributes:
-        edges: pairs of agents, the lower number first (n_edges, 2).
-        degrees: number of edges of each agent (n_agents,).
-        everything: all actions of each agent, as bits (n_agents,).
-        order: the agents as they are eliminated (n_agents,).
-        ranks: the place of each agent in that order (n_agents,).
-        offsets: where each function's values begin (n_functions,).
-        strides: what a step of each agent's action adds; 0 where a function does not depend on it
-            (n_functions, n_agents).
-        sizes: number of values of each function (n_functions,).
-        inputs: functions that each step maximizes, filled up with -1 (n_agents, width).
-        solver: one of the numbers in `solvers.SOLVERS`.
-        rounds: starts of coordinate ascent, or most rounds of messages.
     """
 
-    edges: Integers
-    degrees: Integers
-    everything: Integers
-    order: Integers
-    ranks: Integers
-    offsets: Integers
+    edges: Integers  # pairs of agents, the lower number first (n_edges, 2)
+    degrees: Integers  # number of edges of each agent (n_agents,)
+    everything: Integers  # all actions of each agent, as bits (n_agents,)
+    order: Integers  # the agents as they are eliminated (n_agents,)
+    ranks: Integers  # the place of each agent in that order (n_agents,)
+    offsets: Integers  # where each function's values begin (n_functions,)
+    # What a step of each agent's action adds; 0 where a function does not depend on it
+    # (n_functions, n_agents).
     strides: Integers
-    sizes: Integers
-    inputs: Integers
-    solver: int
-    rounds: int
+    sizes: Integers  # number of values of each function (n_functions,)
+    inputs: Integers  # functions that each step maximizes, filled up with -1 (n_agents, width)
+    solver: int  # one of the numbers in `solvers.SOLVERS`
+    rounds: int  # starts of coordinate ascent, or most rounds of messages
 
 
 def make_graph(
@@ -163,23 +143,18 @@ def _list_inputs(order: Sequence[int], scopes: Sequence[tuple[int, ...]]) -> Int
 
 
 class Scratch(NamedTuple):
-    """Work arrays.
+    """Work arrays."""
 
-    Attributes:
-        values: of all functions of the graph, one after the other; the edges' payoffs first.
-        messages: of each edge, from either end, about the other's actions (n_edges, 2, n_actions).
-        scores, replies: of one agent's actions (n_actions,).
-        trial, best: joint actions (n_agents,).
-        errors: TD error of each agent (n_agents,).
-    """
-
-    values: Floats
+    values: Floats  # of all functions of the graph, one after the other; the edges' payoffs first
+    # Of each edge, from either end, about the other's actions (n_edges, 2, n_actions).
     messages: Floats
+    # scores, replies: of one agent's actions (n_actions,).
     scores: Floats
     replies: Floats
+    # trial, best: joint actions (n_agents,).
     trial: Integers
     best: Integers
-    errors: Floats
+    errors: Floats  # TD error of each agent (n_agents,)
 
 
 def make_scratch(graph: Graph, n_actions: int) -> Scratch:

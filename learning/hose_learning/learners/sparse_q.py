@@ -4,8 +4,6 @@ As in coordinated Q-learning the team's values are a sum over edges, but each ed
 rewards and values of its own two agents: no error of the whole team has to be known.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numpy.random import Generator

@@ -4,8 +4,6 @@ The team is one learner that sees what all agents see and chooses for all of the
 game's joint actions, which is exact and grows exponentially with the number of agents.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 
@@ -33,8 +31,7 @@ from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.stream import Stream, draw_below, draw_unit
 from hose_mj.tasks.task import Task
 
-LARGEST_WIDTH = 1024
-"""Most joint actions."""
+LARGEST_WIDTH = 1024  # most joint actions
 
 
 class Team(NamedTuple):

@@ -4,8 +4,6 @@ As in Algorithm 6.3 each agent learns from whole cycles, but only from good surp
 its last moves too, each the less the longer ago it was.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -27,31 +25,19 @@ OPTIONS = {"trace_decay": 0.9, "n_kept": 50}
 
 
 class Traces(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discounts: 1, gamma, .., gamma^N (n_agents + 1,).
-        trace_decay: lambda.
-    """
-
-    discounts: Floats
-    trace_decay: float
+    discounts: Floats  # 1, gamma, .., gamma^N (n_agents + 1,)
+    trace_decay: float  # lambda
 
 
 class EligibilityTrace(NamedTuple):
-    """The last moves of each agent, the latest one first.
+    """The last moves of each agent, the latest one first."""
 
-    Attributes:
-        keys: what its modules saw (n_agents, n_kept, n_modules).
-        actions: what it did (n_agents, n_kept).
-        ages: moves of its own since then (n_agents, n_kept).
-        lengths: how many are remembered (n_agents,).
-    """
-
-    keys: Integers
-    actions: Integers
-    ages: Integers
-    lengths: Integers
+    keys: Integers  # what its modules saw (n_agents, n_kept, n_modules)
+    actions: Integers  # what it did (n_agents, n_kept)
+    ages: Integers  # moves of its own since then (n_agents, n_kept)
+    lengths: Integers  # how many are remembered (n_agents,)
 
 
 def make(task: Task, settings: LearnerSettings, generator: Generator) -> Made:

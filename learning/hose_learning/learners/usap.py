@@ -5,8 +5,6 @@ agent's classifier, which is fitted anew every so often; from then on an action 
 undesired with probability 1/2 or more is not taken.
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -145,11 +143,6 @@ class UndesiredPredictor:
             labels.append(np.full(len(kept), label == UNDESIRED))
         return np.concatenate(values).astype(np.int64), np.concatenate(labels)
 
-    def predict(self, values: Integers, agent: int) -> Floats:
-        """Returns p(s, a) of all actions in what an agent sees (n_actions,)."""
-        actions = range(self.forest.trained.shape[1])
-        return np.array([predict_undesired(self.forest, values, agent, a) for a in actions])
-
     def veto_mask(self, values: Integers, agent: int) -> int:
         """Returns the actions to avoid in what an agent sees, as bits; they may be all."""
         return int(compute_veto_mask(self.forest, values, agent))
@@ -175,43 +168,28 @@ LEAF = -1
 
 
 class Buffer(NamedTuple):
-    """A balanced training set for each agent: as many instances at most of each action and class.
+    """A balanced training set for each agent: as many instances at most per action and class."""
 
-    Attributes:
-        values: all variables (n_agents, n_actions, 2, capacity, n_variables).
-        counts: how many of the places are taken, the first ones (n_agents, n_actions, 2).
-        seen: how many instances each agent has been given since its last fit (n_agents,).
-    """
-
-    values: Small
-    counts: Integers
-    seen: Integers
+    values: Small  # all variables (n_agents, n_actions, 2, capacity, n_variables)
+    counts: Integers  # how many of the places are taken, the first ones (n_agents, n_actions, 2)
+    seen: Integers  # how many instances each agent has been given since its last fit (n_agents,)
 
 
 class Forest(NamedTuple):
-    """What was learned from the buffer.
+    """What was learned from the buffer."""
 
-    Attributes:
-        feature: what a node splits by, a variable's number or n_variables for the action; LEAF in a
-            leaf (n_agents, n_trees, n_nodes).
-        threshold: a value up to it goes left (n_agents, n_trees, n_nodes).
-        left: the left child (n_agents, n_trees, n_nodes).
-        right: the right child (n_agents, n_trees, n_nodes).
-        undesired: share of undesired instances in a node (n_agents, n_trees, n_nodes).
-        trained: mu_(a, omega), the instances of each action and class that the forest was fitted
-            to (n_agents, n_actions, 2).
-        minimum: mu, the least of them with which an action may be vetoed.
-        veto_probability: actions are vetoed from this probability on.
-    """
-
+    # What a node splits by, a variable's number or n_variables for the action; LEAF in a leaf
+    # (n_agents, n_trees, n_nodes).
     feature: Small
-    threshold: Floats
-    left: Small
-    right: Small
-    undesired: Floats
+    threshold: Floats  # a value up to it goes left (n_agents, n_trees, n_nodes)
+    left: Small  # the left child (n_agents, n_trees, n_nodes)
+    right: Small  # the right child (n_agents, n_trees, n_nodes)
+    undesired: Floats  # share of undesired instances in a node (n_agents, n_trees, n_nodes)
+    # mu_(a, omega), the instances of each action and class that the forest was fitted to (n_agents,
+    # n_actions, 2).
     trained: Integers
-    minimum: int
-    veto_probability: float
+    minimum: int  # mu, the least of them with which an action may be vetoed
+    veto_probability: float  # actions are vetoed from this probability on
 
 
 @jitable
@@ -273,15 +251,10 @@ class, with which the taxi is not learned."""
 
 
 class Usap(NamedTuple):
-    """The rule's constants.
+    """The rule's constants."""
 
-    Attributes:
-        discounts: 1, gamma, .., gamma^N (n_agents + 1,).
-        undesired: the events that make a move undesired.
-    """
-
-    discounts: Floats
-    undesired: int
+    discounts: Floats  # 1, gamma, .., gamma^N (n_agents + 1,)
+    undesired: int  # the events that make a move undesired
 
 
 class Prediction(NamedTuple):

@@ -1,7 +1,5 @@
 """Decision processes written out with their terminal states, as chapter 7 speaks of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -21,23 +19,17 @@ Flags = npt.NDArray[np.bool_]
 class MarkovModel:
     """A finite decision process <S, A, P, R> whose reward depends on the state that is entered.
 
-    Attributes:
-        transitions: P(s, a, s'), row s n_actions + a, (n_states n_actions, n_states); the rows of a
-            terminal state are empty.
-        rewards: R(s), received when s is entered (n_states,).
-        terminal: whether the episode ends there (n_states,).
-        actions: names of the actions.
-        names: names of the states.
-
     Raises:
         InputError: shapes that do not fit, or rows that are not distributions.
     """
 
+    # P(s, a, s'), row s n_actions + a, (n_states n_actions, n_states); the rows of a terminal state
+    # are empty.
     transitions: csr_array
-    rewards: Floats
-    terminal: Flags
-    actions: tuple[str, ...]
-    names: tuple[str, ...]
+    rewards: Floats  # R(s), received when s is entered (n_states,)
+    terminal: Flags  # whether the episode ends there (n_states,)
+    actions: tuple[str, ...]  # names of the actions
+    names: tuple[str, ...]  # names of the states
 
     def __post_init__(self) -> None:
         n = self.n_states
@@ -66,20 +58,14 @@ class MarkovModel:
 
 @dataclass(frozen=True, eq=False)
 class WrittenTask:
-    """A task as a decision process.
+    """A task as a decision process."""
 
-    Attributes:
-        model: the process. Its states are those of the task together with the events of the move
-            that led there, which is what rewards and ends depend on.
-        states: the task's states, step count 0 (n_states, state_size).
-        events: events of the move that led there (n_states,).
-        numbers: (state's bytes, events) to the number of the state.
-    """
-
+    # The process. Its states are those of the task together with the events of the move that led
+    # there, which is what rewards and ends depend on.
     model: MarkovModel
-    states: Integers
-    events: Integers
-    numbers: dict[tuple[bytes, int], int]
+    states: Integers  # the task's states, step count 0 (n_states, state_size)
+    events: Integers  # events of the move that led there (n_states,)
+    numbers: dict[tuple[bytes, int], int]  # (state's bytes, events) to the number of the state
 
 
 def write_out(task: Task, starts: Iterable[Integers], limit: int = 10**5) -> WrittenTask:
@@ -151,10 +137,8 @@ def describe_state(task: Task, state: Integers, events: int = 0) -> str:
 def solve(model: MarkovModel, discount: float, tolerance: float = 1e-12) -> Floats:
     """Returns Q*(s, a) by value iteration (n_states, n_actions); 0 in terminal states.
 
-    Q*(s, a) = sum_s' P(s, a, s') [R(s') + gamma max_a' Q*(s', a')].
-
-    Raises:
-        InputError: a discount outside [0, 1).
+    Q*(s, a) = sum_s' P(s, a, s') [R(s') + gamma max_a' Q*(s', a')]. `InputError` is raised for a
+    discount outside [0, 1).
     """
     _check_discount(discount)
     q_values = np.zeros((model.n_states, model.n_actions))

@@ -5,8 +5,6 @@ playing in turns. For a joint move the agents pass a message around once: the st
 so far may have brought about, each with its probability. All of it is plain Python on dicts.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,8 +24,7 @@ from hose_mj.tasks.task import Task
 
 State = tuple[int, ...]
 """A task's state, its step count left out; it is nobody's turn (-1) in a terminal one."""
-Message = Mapping[State, float]
-"""Probability of each state, <s^j, P^_j>."""
+Message = Mapping[State, float]  # probability of each state, <s^j, P^_j>
 Evaluate = Callable[[int, State], Mapping[int, float]]
 """Q^i(s, .) of an agent, for the actions that it may take."""
 NOBODY = -1
@@ -70,23 +67,15 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Composition:
-    """A joint move that agents agreed on: an action for each, in the order of their turns.
+    """A joint move that agents agreed on."""
 
-    `messages` are what each agent got, and at last what the cycle leads to; `value` is what eqs 6.5
-    and 6.6 expect of it, rewards that are not positive left out.
-    """
-
-    actions: tuple[int, ...]
-    messages: tuple[Message, ...]
-    value: float
+    actions: tuple[int, ...]  # one of each agent, in the order of their turns
+    messages: tuple[Message, ...]  # what each agent got, and at last what the cycle leads to
+    value: float  # what eqs 6.5 and 6.6 expect of it, rewards that are not positive left out
 
 
 def compose(
-    start: State,
-    estimates: Sequence[Estimates],
-    evaluate: Evaluate,
-    discount: float,
-    idle: int,
+    start: State, estimates: Sequence[Estimates], evaluate: Evaluate, discount: float, idle: int
 ) -> Composition:
     """Lets the agents agree on a joint move from s_0, agent 0's turn, one after the other.
 

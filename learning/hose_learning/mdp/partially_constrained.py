@@ -1,7 +1,5 @@
 """Partially constrained models (thesis chapter 7): Definition 11 and what follows from it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -17,8 +15,7 @@ from hose_mj.tasks.registry import make_task
 from hose_mj.tasks.stream import make_stream
 from hose_mj.tasks.task import Task
 
-ABSENT = -1
-"""The projection of a target state that the source does not have."""
+ABSENT = -1  # the projection of a target state that the source does not have
 PROPERTIES = {
     1: "each target state projects onto a source state",
     2: "the transition probabilities are kept",
@@ -31,23 +28,14 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class PcmViolation:
-    """A property of Definition 11 that does not hold.
+    """A property of Definition 11 that does not hold."""
 
-    Attributes:
-        number: 1 to 4, a key of `PROPERTIES`.
-        count: states, or states and actions, at which it does not.
-        state: number of the first such target state.
-        action: the action there; None where the property is about states.
-        source: what the source says there, in words.
-        target: what the target says there.
-    """
-
-    number: int
-    count: int
-    state: int
-    action: int | None
-    source: str
-    target: str
+    number: int  # 1 to 4, a key of `PROPERTIES`
+    count: int  # states, or states and actions, at which it does not
+    state: int  # number of the first such target state
+    action: int | None  # the action there; None where the property is about states
+    source: str  # what the source says there, in words
+    target: str  # what the target says there
 
     def __str__(self) -> str:
         return f"property {self.number} ({PROPERTIES[self.number]}) has exceptions: {self.count}"
@@ -114,14 +102,8 @@ def _check_transitions(
     if len(wrong) == 0:
         return None
     state, action = divmod(int(rows[wrong[0]]), n_actions)
-    return PcmViolation(
-        2,
-        len(wrong),
-        state,
-        action,
-        describe_move(source, int(projection[state]), action),
-        describe_move(target, state, action),
-    )
+    move = describe_move(source, int(projection[state]), action)
+    return PcmViolation(2, len(wrong), state, action, move, describe_move(target, state, action))
 
 
 def _check_rewards(
@@ -142,14 +124,9 @@ def _check_rewards(
             yield None
             continue
         state = int(wrong[0])
-        yield PcmViolation(
-            number,
-            len(wrong),
-            state,
-            None,
-            f"{source.names[projection[state]]}: reward {in_source[state]:g}",
-            f"{target.names[state]}: reward {target.rewards[state]:g}",
-        )
+        ours = f"{source.names[projection[state]]}: reward {in_source[state]:g}"
+        theirs = f"{target.names[state]}: reward {target.rewards[state]:g}"
+        yield PcmViolation(number, len(wrong), state, None, ours, theirs)
 
 
 def describe_move(model: MarkovModel, state: int, action: int) -> str:
@@ -165,20 +142,15 @@ def describe_move(model: MarkovModel, state: int, action: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Propositions:
-    """What chapter 7 concludes, measured on one pair of tasks, in the target's n states.
+    """What chapter 7 concludes, measured on one pair of tasks, in the target's n states."""
 
-    Attributes:
-        unsafe_in_source: actions that are safe in the target and not in the source; Proposition 4
-            says that there are none.
-        bounds: max_a Q_s*([s], a) (n,).
-        best: V_t*(s) (n,).
-        greedy: V of the greedy policy among the target's safe actions, transferred by equations 7.1
-            and 7.2 (n,).
-    """
-
+    # Actions that are safe in the target and not in the source; Proposition 4 says that there are
+    # none.
     unsafe_in_source: int
-    bounds: Floats
-    best: Floats
+    bounds: Floats  # max_a Q_s*([s], a) (n,)
+    best: Floats  # V_t*(s) (n,)
+    # V of the greedy policy among the target's safe actions, transferred by equations 7.1 and 7.2
+    # (n,).
     greedy: Floats
 
     @property
@@ -229,18 +201,15 @@ def choose_greedy(q_values: Floats, allowed: np.ndarray) -> Integers:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two tasks by their ids and options, and the properties of Definition 11 that do not hold.
+    """Two tasks by their ids and options."""
 
-    `settings` are options of both tasks; `meaning` is a line about the pair.
-    """
-
-    meaning: str
+    meaning: str  # a line about the pair
     source: str
     target: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)  # of both
     source_settings: Mapping[str, Any] = field(default_factory=dict)
     target_settings: Mapping[str, Any] = field(default_factory=dict)
-    violated: tuple[int, ...] = ()
+    violated: tuple[int, ...] = ()  # properties of Definition 11 that do not hold
 
 
 _FLOOR = {"n_robots": 2, "hose_length": 20, "start": ((1, 1), (1, 0)), "goal": (2, 2)}
@@ -317,9 +286,7 @@ def write_pair(
     written_source = explicit_mdp.write_out(source, [project_state(source, target, start)], limit)
     written_target = explicit_mdp.write_out(target, [start], limit)
     return WrittenPair(
-        written_source,
-        written_target,
-        _project_all(source, target, written_source, written_target),
+        written_source, written_target, _project_all(source, target, written_source, written_target)
     )
 
 

@@ -4,8 +4,6 @@ A cooperative game in turns realizes a game of joint moves if a joint action a_i
 agent but the i-th is idle, does what agent i's action a_i does alone (Definition 10).
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -32,20 +30,15 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class SequentialViolation:
-    """A property of Definition 10, a key of `PROPERTIES`, that does not hold.
+    """A property of Definition 10 that does not hold."""
 
-    `count` is the number of states, agents and actions for which it does not; `state` (in words),
-    `agent` and `action` (names) are the first of them. `alone` is what comes of the action alone,
-    `jointly` what comes of the joint action in which it alone is not idle.
-    """
-
-    number: int
-    count: int
-    state: str
-    agent: str
-    action: str
-    alone: str
-    jointly: str
+    number: int  # a key of `PROPERTIES`
+    count: int  # states, agents and actions for which it does not
+    state: str  # of the first of them, in words
+    agent: str  # its name
+    action: str  # its name
+    alone: str  # what comes of the action alone
+    jointly: str  # what comes of the joint action in which it alone is not idle
 
     def __str__(self) -> str:
         return f"property {self.number} ({PROPERTIES[self.number]}) has exceptions: {self.count}"
@@ -63,13 +56,10 @@ class MoveOutcome:
 
 @dataclass(frozen=True)
 class SequentialStudy:
-    """What was compared, whosever turn it is, and the properties that do not hold.
-
-    `n_moves` is the number of states times agents times actions.
-    """
+    """What was compared, whosever turn it is, and the properties that do not hold."""
 
     n_states: int
-    n_moves: int
+    n_moves: int  # states times agents times actions
     violations: tuple[SequentialViolation, ...]
 
 

@@ -1,7 +1,5 @@
 """Attributes of the classifiers: what the agent saw and did, as numbers in [0, 1] (section 8.2)."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
@@ -42,11 +40,8 @@ class Encoding:
     cells: Literal["coordinates", "number"] = "coordinates"
 
     def __post_init__(self) -> None:
-        for name, choices in {
-            "action": ("integer", "one-hot"),
-            "cells": ("coordinates", "number"),
-        }.items():
-            check_choice(name, getattr(self, name), choices)
+        check_choice("action", self.action, ("integer", "one-hot"))
+        check_choice("cells", self.cells, ("coordinates", "number"))
 
 
 def make_attributes(experience: Experience, encoding: Encoding) -> tuple[Floats, tuple[str, ...]]:

@@ -1,7 +1,5 @@
 """The twelve classifiers of Tables 8.1 and 8.2 by id, each with what stands for it here."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -55,8 +53,7 @@ class ClusterClassifier:
 
     def predict(self, attributes: Floats) -> Bools:
         """Returns the class of each instance's cluster (n,)."""
-        found: Bools = self._is_undesired[self._clusterer.predict(attributes)]
-        return found
+        return self._is_undesired[self._clusterer.predict(attributes)]
 
 
 class NaiveBayesTree:
@@ -131,16 +128,12 @@ class RbfNetwork:
 
     def predict(self, attributes: Floats) -> Bools:
         """Returns the likelier class (n,)."""
-        predicted: Bools = np.asarray(
-            self._regression.predict(self._compute_bumps(attributes)), np.bool_
-        )
-        return predicted
+        return np.asarray(self._regression.predict(self._compute_bumps(attributes)), np.bool_)
 
     def _compute_bumps(self, attributes: Floats) -> Floats:
         """Returns each bump's height at each instance (n, n_bumps)."""
         distances = ((attributes[:, None, :] - self._centres) ** 2).sum(axis=2)
-        bumps: Floats = np.exp(-distances / (2.0 * self._widths**2 * attributes.shape[1]))
-        return bumps
+        return np.exp(-distances / (2.0 * self._widths**2 * attributes.shape[1]))
 
 
 Family = Literal["neighbours", "Bayes", "tree", "clusters", "support vectors", "network"]
@@ -163,15 +156,13 @@ class Setup:
 
 @dataclass(frozen=True)
 class ClassifierEntry:
-    """A classifier: its name in the thesis's tables, what runs here, its family and how it is made.
+    """A classifier, and how it is made."""
 
-    `stands_in` says whether scikit-learn lacks the thesis's algorithm, so that another one runs.
-    """
-
-    name: str
-    runs: str
+    name: str  # in the thesis's tables
+    runs: str  # what runs here
     family: Family
     make: Callable[[Setup], Classifier]
+    # Whether scikit-learn lacks the thesis's algorithm, so that another one runs.
     stands_in: bool = False
 
 
@@ -183,36 +174,28 @@ def count_split_attributes(n_attributes: int) -> int:
 def make_forest(setup: Setup) -> Classifier:
     """Makes a random forest of ten trees, Weka's default at the time of the thesis."""
     features = count_split_attributes(setup.n_attributes)
-    forest: Classifier = RandomForestClassifier(
+    return RandomForestClassifier(
         10, criterion="entropy", max_features=features, random_state=setup.seed
     )
-    return forest
 
 
 def make_entropy_tree(setup: Setup) -> Classifier:
     """Makes an unpruned tree that splits where entropy falls most."""
-    tree: Classifier = DecisionTreeClassifier(criterion="entropy", random_state=setup.seed)
-    return tree
+    return DecisionTreeClassifier(criterion="entropy", random_state=setup.seed)
 
 
 def _make_support_vectors(kernel: str) -> Callable[[Setup], Classifier]:
-    def make(setup: Setup) -> Classifier:
-        machine: Classifier = NuSVC(nu=setup.nu, kernel=kernel, gamma="scale")
-        return machine
-
-    return make
+    return lambda setup: NuSVC(nu=setup.nu, kernel=kernel, gamma="scale")
 
 
-def _make_k_means(setup: Setup) -> Classifier:
-    return ClusterClassifier(KMeans(2, n_init=10, random_state=setup.seed), setup.cluster_rule)
+def _make_clusters(find: Callable[[int], Any]) -> Callable[[Setup], Classifier]:
+    """What makes a classifier of the clusters that `find` makes a finder of, from a seed."""
+    return lambda setup: ClusterClassifier(find(setup.seed), setup.cluster_rule)
 
 
-def _make_birch(setup: Setup) -> Classifier:
-    return ClusterClassifier(Birch(threshold=0.5, n_clusters=2), setup.cluster_rule)
-
-
-def _make_mixture(setup: Setup) -> Classifier:
-    return ClusterClassifier(GaussianMixture(2, random_state=setup.seed), setup.cluster_rule)
+_make_k_means = _make_clusters(lambda seed: KMeans(2, n_init=10, random_state=seed))
+_make_birch = _make_clusters(lambda seed: Birch(threshold=0.5, n_clusters=2))
+_make_mixture = _make_clusters(lambda seed: GaussianMixture(2, random_state=seed))
 
 
 CLASSIFIERS: dict[str, ClassifierEntry] = {

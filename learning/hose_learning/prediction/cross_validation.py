@@ -1,7 +1,5 @@
 """Repeated stratified cross-validation of two-class classifiers (section 8.3.1)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -88,18 +86,13 @@ class Split:
 
 @dataclass(frozen=True)
 class Score:
-    """One measure over all folds.
+    """One measure over all folds."""
 
-    Attributes:
-        mean: over the folds in which the measure exists; NaN where it exists in none.
-        deviation: standard deviation over these folds.
-        interval: half width of the 95 % confidence interval of the mean, with the variance of
-            Nadeau and Bengio (2003): training sets of one log overlap, so that the folds are not
-            independent and the plain standard error is too small.
-    """
-
-    mean: float
-    deviation: float
+    mean: float  # over the folds in which the measure exists; NaN where it exists in none
+    deviation: float  # standard deviation over these folds
+    # Half width of the 95 % confidence interval of the mean, with the variance of Nadeau and Bengio
+    # (2003): training sets of one log overlap, so that the folds are not independent and the plain
+    # standard error is too small.
     interval: float
 
 

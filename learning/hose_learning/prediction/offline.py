@@ -1,7 +1,5 @@
 """The experiment of section 8.3.1: all classifiers on random logs, beside the thesis's tables."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -21,8 +19,7 @@ from hose_mj.errors import InputError
 from hose_mj.tasks.kernels import Floats
 from hose_mj.tasks.registry import make_task
 
-MARGIN = 0.001
-"""The tables round their numbers (to 0.01 %), and average them over folds."""
+MARGIN = 0.001  # the tables round their numbers (to 0.01 %), and average them over folds
 
 
 @dataclass(frozen=True)
@@ -43,16 +40,12 @@ class Published:
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """A table of the thesis, such as 8.2: what was classified, in words, and its rows.
+    """A table of the thesis."""
 
-    `cycles` is the length of the log, in moves of each agent; `agents` has for each agent the rows
-    by id of the classifier.
-    """
-
-    number: str
-    data: str
-    cycles: int
-    agents: tuple[dict[str, Published], ...]
+    number: str  # such as 8.2
+    data: str  # what was classified, in words
+    cycles: int  # length of the log, in moves of each agent
+    agents: tuple[dict[str, Published], ...]  # for each agent the rows by id of the classifier
 
 
 def read_table(task: str) -> PublishedTable | None:
@@ -78,11 +71,9 @@ def _make_row(per_cent: dict[str, float]) -> Published:
     return Published(measures, not is_between)
 
 
-Scores = dict[str, cross_validation.Score]
-"""By the names of `MEASURES`."""
+Scores = dict[str, cross_validation.Score]  # by the names of `MEASURES`
 
-LIFTED = 10**9
-"""A step limit that no log reaches."""
+LIFTED = 10**9  # a step limit that no log reaches
 COMPARED = ("1-nn", "naive-bayes", "random-forest", "c4.5")
 """Whose accuracy is held against the table: they hardly depend on settings that it leaves open."""
 CONFIDENCE = 0.99
@@ -90,31 +81,18 @@ CONFIDENCE = 0.99
 
 @dataclass(frozen=True, kw_only=True)
 class OfflinePlan:
-    """What is to be measured.
+    """What is to be measured; `InputError` for fewer than one cycle or log, or a negative seed."""
 
-    Attributes:
-        task: id of the task.
-        cycles: moves of each agent in a log.
-        logs: number of logs. The first is measured as the thesis's was, the others once each, for
-            how much the numbers differ from log to log.
-        repeats: how often the folds of the first log are drawn anew.
-        folds: parts that each agent's moves are split into.
-        encoding: how states and actions become attributes.
-        cluster_rule: how clusters become classes, see `ClusterClassifier`.
-        seed: of everything random.
-
-    Raises:
-        InputError: fewer than one cycle or log, or a negative seed.
-    """
-
-    task: str = "taxi"
-    cycles: int = 2002
+    task: str = "taxi"  # id of the task
+    cycles: int = 2002  # moves of each agent in a log
+    # Number of logs. The first is measured as the thesis's was, the others once each, for how much
+    # the numbers differ from log to log.
     logs: int = 8
-    repeats: int = 10
-    folds: int = 10
-    encoding: Encoding = field(default_factory=Encoding)
-    cluster_rule: ClusterRule = "matched"
-    seed: int = 0
+    repeats: int = 10  # how often the folds of the first log are drawn anew
+    folds: int = 10  # parts that each agent's moves are split into
+    encoding: Encoding = field(default_factory=Encoding)  # how states and actions become attributes
+    cluster_rule: ClusterRule = "matched"  # how clusters become classes, see `ClusterClassifier`
+    seed: int = 0  # of everything random
 
     def __post_init__(self) -> None:
         for name in ("cycles", "logs"):
@@ -126,17 +104,13 @@ class OfflinePlan:
 
 @dataclass(frozen=True)
 class Result:
-    """One classifier on one agent's moves: its scores on the first log, by `MEASURES`.
-
-    `over_logs` has the mean of each measure on every log (n_logs,), the first one's first;
-    `published` is the row of the thesis's table, None without one.
-    """
+    """One classifier on one agent's moves."""
 
     agent: str
     classifier: str
-    scores: Scores
-    over_logs: dict[str, Floats]
-    published: Published | None
+    scores: Scores  # on the first log
+    over_logs: dict[str, Floats]  # the mean of each measure on every log (n_logs,)
+    published: Published | None  # the row of the thesis's table, None without one
 
 
 @dataclass(frozen=True, eq=False)

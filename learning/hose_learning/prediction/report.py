@@ -1,7 +1,5 @@
 """What `hose-mj classifiers` prints and writes: tables, log, records and a plot."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -19,14 +17,13 @@ from hose_mj.recording.files import write_atomically
 from hose_mj.recording.parquet import write_records
 from hose_mj.recording.plots.bars import Bar, BarPanel, plot_bars
 
-HEADINGS = {
-    "accuracy": "accuracy",
-    "sensitivity": "sens.",
-    "specificity": "spec.",
-    "npv": "NPV",
-    "ppv": "PPV",
-    "over_logs": "over logs",
-}
+HEADINGS = dict(
+    zip(
+        (*MEASURES, "over_logs"),
+        ("accuracy", "sens.", "spec.", "NPV", "PPV", "over logs"),
+        strict=True,
+    )
+)
 PLOTTED = {"accuracy": "accuracy", "specificity": "specificity: undesired moves found"}
 
 

@@ -1,7 +1,5 @@
 """The thesis's experiments as data, and what each has to show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,32 +18,25 @@ Runs = Mapping[str, list[Result]]
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of one claim, beside what the thesis says, in words or numbers.
-
-    `ours` is what we measured, in a unit, with the 95 % interval of it, from so many seeds; `check`
-    is the limit it is held to, if any.
-    """
+    """What was found of one claim, beside what the thesis says."""
 
     claim: str
-    thesis: str
-    ours: float
-    interval: tuple[float, float]
+    thesis: str  # in words or numbers
+    ours: float  # what we measured
+    interval: tuple[float, float]  # the 95 % interval of it
     n_seeds: int
-    check: Check | None = None
+    check: Check | None = None  # the limit it is held to, if any
     unit: str = ""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment, and how the thesis was read where it leaves something open.
-
-    `list_jobs` makes the jobs of a list of seeds, `conclude` the findings from all results by the
-    jobs' names.
-    """
+    """An experiment of the thesis."""
 
     title: str
-    reading: str
-    list_jobs: Callable[[Sequence[int]], list[Job]]
+    reading: str  # how the thesis was read where it leaves something open
+    list_jobs: Callable[[Sequence[int]], list[Job]]  # the jobs of some seeds
+    # The findings from all results, by the jobs' names.
     conclude: Callable[[Runs, int], list[Finding]]
 
 
@@ -172,8 +163,7 @@ _TEAMS: dict[str, tuple[str, dict[str, Any]]] = {
 """Goal modules that see their agent's cell and neighbours learn more than those that see everybody,
 and D-QL more where it keeps its policy."""
 HELD = "d-rr-ql"
-N_PEER_SEEDS = 3
-"""Seeds of what is only reported beside it: these runs take most of the time."""
+N_PEER_SEEDS = 3  # seeds of what is only reported beside it: these runs take most of the time
 
 
 def make_configuration(number: int) -> dict[str, Any]:

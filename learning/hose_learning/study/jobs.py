@@ -3,8 +3,6 @@
 What a job gives depends on nothing but the job, so the order of the workers does not matter.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -26,25 +24,15 @@ from hose_mj.tasks.registry import make_task
 
 @dataclass(frozen=True)
 class Measures:
-    """What section 6.6 measures. A step is a move in turns, or a joint move (footnote 2).
+    """What section 6.6 measures. A step is a move in turns, or a joint move (footnote 2)."""
 
-    Attributes:
-        n_g: training steps until an episode first reaches the goal, or None.
-        n_f: training steps until a greedy test first does, or None.
-        s_f: steps of that test, or None.
-        s_b: steps of the best test, or None.
-        steps: training steps in all.
-        n_tests: number of tests.
-        n_valid: how many of them reached the goal.
-    """
-
-    n_g: int | None
-    n_f: int | None
-    s_f: int | None
-    s_b: int | None
-    steps: int
-    n_tests: int
-    n_valid: int
+    n_g: int | None  # training steps until an episode first reaches the goal, or None
+    n_f: int | None  # training steps until a greedy test first does, or None
+    s_f: int | None  # steps of that test, or None
+    s_b: int | None  # steps of the best test, or None
+    steps: int  # training steps in all
+    n_tests: int  # number of tests
+    n_valid: int  # how many of them reached the goal
 
 
 def measure(
@@ -87,37 +75,24 @@ def measure(
     return Measures(n_g, n_f, s_f, s_b, training.moves // per_step, n_tests, n_valid)
 
 
-VERSION = 1
-"""Raised when the same job would give something else than before."""
+VERSION = 1  # raised when the same job would give something else than before
 Result = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """One training run.
+    """One training run."""
 
-    Attributes:
-        name: what it is a run of; runs of one name differ in seed or configuration alone.
-        task: id of the task.
-        options: the task's options.
-        learner: id of the learner.
-        settings: arguments of `catalog.make_settings`; those of `Exploration` under
-            "exploration".
-        seed: seeds everything that is left to chance.
-        episodes: most episodes.
-        steps: most training steps (`measures.measure`).
-        test_every: episodes between two greedy tests; 0 tests once, at the end.
-    """
-
-    name: str
-    task: str
-    options: Mapping[str, Any] = field(default_factory=dict)
-    learner: str
+    name: str  # what it is a run of; runs of one name differ in seed or configuration alone
+    task: str  # id of the task
+    options: Mapping[str, Any] = field(default_factory=dict)  # the task's options
+    learner: str  # id of the learner
+    # Arguments of `catalog.make_settings`; those of `Exploration` under "exploration".
     settings: Mapping[str, Any] = field(default_factory=dict)
-    seed: int
-    episodes: int | None = None
-    steps: int | None = None
-    test_every: int = 0
+    seed: int  # seeds everything that is left to chance
+    episodes: int | None = None  # most episodes
+    steps: int | None = None  # most training steps (`measures.measure`)
+    test_every: int = 0  # episodes between two greedy tests; 0 tests once, at the end
 
     @property
     def identity(self) -> str:

@@ -5,8 +5,6 @@
 and the checkpoint last of all, so a run that is killed goes on from its last checkpoint.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import io
@@ -224,12 +222,9 @@ class RunFolder:
             **description,
             "identity": compute_identity(description),
             "ends": dict(ends or {}),
-            "versions": {
-                "hose_mj": __version__,
-                "numpy": np.__version__,
-                "python": platform.python_version(),
-            },
         }
+        versions = {"hose_mj": __version__, "numpy": np.__version__}
+        config["versions"] = {**versions, "python": platform.python_version()}
         self._write(CONFIG, config)
 
     def open(self) -> tuple[Training, int]:

@@ -1,7 +1,5 @@
 """Intervals that stand beside every reported rate and mean."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

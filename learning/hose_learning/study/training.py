@@ -1,7 +1,5 @@
 """`Training`: a learner on a task, trained for as long as one likes, tested and saved."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -19,21 +17,17 @@ from hose_mj.tasks.kernels import Floats, Integers
 from hose_mj.tasks.task import Task
 
 LOG_CAPACITY = 2**14
-CHUNK = {True: 2**18, False: 2**9}
-"""Moves between two looks at the clock, compiled and not."""
+CHUNK = {True: 2**18, False: 2**9}  # moves between two looks at the clock, compiled and not
 Manner = Literal["turns", "joint", "composed"]
 
 
 @dataclass(frozen=True)
 class Episodes:
-    """Episodes as columns (n,): moves of single agents, last events, sums of all rewards.
+    """Episodes as columns (n,)."""
 
-    The sums are NaN in a test.
-    """
-
-    moves: Integers
-    events: Integers
-    returns: Floats
+    moves: Integers  # of single agents
+    events: Integers  # the last ones
+    returns: Floats  # sums of all rewards; NaN in a test
 
     def __len__(self) -> int:
         """Number of episodes."""
@@ -185,11 +179,8 @@ class Training:
             raise InputError("manner", manner, f"{' or '.join(valid)} for {self.learner_id}")
         results = np.zeros((episodes, 2), np.int64)
         probe = evaluation.make_probe(self.memory)
-        manners = {
-            "turns": evaluation.Turns(),
-            "joint": evaluation.Joint(),
-            "composed": evaluation.Composed(self.task.make_state()),
-        }
+        composed = evaluation.Composed(self.task.make_state())
+        manners = {"turns": evaluation.Turns(), "joint": evaluation.Joint(), "composed": composed}
         most = self.task.step_limit if max_moves is None else max_moves
         run = evaluation.run_tests if self._compiled else evaluation.run_tests.py_func
         run(manners[manner], self.task.kernel, self.learner, probe, episodes, most, results)

@@ -63,7 +63,6 @@ DRAWINGS = {
     "shapes": lambda: plot_shapes("t", SHAPES),
     "cost": lambda: plot_convergence("t", "n", CONVERGENCE, (1,), in_seconds=True),
     "series": lambda: plot_series("t", "y", SERIES, limits={"bound": 2.0}),
-    "series-log": lambda: plot_series("t", "y", SERIES, logy=True),
     "statics": lambda: plot_errors("t", ERRORS),
     "fan": lambda: plot_fan("t", FANS),
 }
@@ -101,7 +100,7 @@ def test_values_that_a_log_axis_cannot_show_do_not_break_it():
     plot_errors("t", [ErrorPoint("geds", "", 8, 0.0)])
     plot_errors("t", [*ERRORS, ErrorPoint("cable", "", 8, 0.0, False)])
     plot_convergence("t", "n", {"geds": ([8, 16], [0.0, 0.0]), "cable": ([8], [0.1])})
-    plot_series("t", "y", {"geds": ([0.0, 1.0], [0.0, 0.0])}, logy=True)
+    plot_series("t", "y", {"geds": ([0.0, 1.0], [0.0, 0.0])})
     plot_series("t", "y", {"geds": ([0.0], [1.0])})
 
 

@@ -90,8 +90,11 @@ def test_shipped_scenes_win(add_scenes):
 def test_files_are_no_names(tmp_path, monkeypatch):
     assert find_named(tmp_path / "floor_1") is None
     assert find_named("floor_1.xml") is None
-    with pytest.raises(InputError, match="floor_1, floor_2"):
-        find_scene("floor_7")
+    for find in (find_scene, mjcf.read_scene):
+        with pytest.raises(InputError, match=r"floor_1, floor_2.*\(did you mean floor_\d\?\)"):
+            find("floor_7")
+        with pytest.raises(InputError, match="scene is None; valid: the name of a scene"):
+            find(None)
 
 
 def test_a_scene_is_read_by_its_name():

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hose_mj.errors import StepError
-from hose_mj.hoses.geds import energy, frames, integrators, mechanics, newton, records
+from hose_mj.hoses.geds import energy, frames, integrators, mechanics, newton, records, stability
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
@@ -31,6 +31,10 @@ inextensibility."""
 _RESET_ITERATIONS = 8
 """A hose with theta resets its frames after so many iterations; with frames that have gathered
 much of the hose's own turns the iteration crawls."""
+
+
+_AIDS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+"""Bending stiffness lent to a chain in statics, in loads times length squared."""
 
 
 @dataclass
@@ -97,9 +101,6 @@ class Dynamics:
             StepError: no equilibrium was found; the state before is kept.
         """
         rows, work = self.constraints.rows, self.make_work()
-        length = self.hose.tables.span_length * len(self.hose.tables.first)
-        tolerance = _STATIC_TOLERANCE * length
-        limits = records.Limits(tolerance, length, _STATIC_ITERATIONS, _STATIC_TURN, False, 1.0)
         verdict, found = records.NOT_CONVERGED, self.state.x
         changing = (rows.twist.accepted, rows.twist.spin, rows.before, rows.after)
         before = [part.copy() for part in changing]
@@ -107,8 +108,8 @@ class Dynamics:
             _copy(before, changing)
             integrators.start_step(self.axes, rows, np.inf)
             found = self.state.x.copy()
-            for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
-                verdict, found = self._iterate(scale, limits, found, work)
+            for hose, scale in self._list_stages(load_steps):
+                verdict, found = self._iterate(hose, scale, found, work)
                 if verdict != records.DONE:
                     break
             load_steps *= 2
@@ -126,20 +127,56 @@ class Dynamics:
         elif len(self.axes) == 4:
             self._accept_frames(self.state, work)
 
+    def _list_stages(self, load_steps: int) -> list[tuple[records.Hose, float]]:
+        """Hoses and shares of their loads through which a static solve goes, its own last.
+
+        A chain (EI = 0) that is not drawn taut resists no load across it. It goes by way of hoses
+        with less and less bending stiffness.
+        """
+        hose = self.hose
+        scales = [float(scale) for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]]
+        if np.any(hose.elasticity.bending_stiffness > 0.0):
+            return [(hose, scale) for scale in scales]
+        length = hose.tables.span_length * len(hose.tables.first)
+        load = float(np.abs(self.loads.loads.force).sum())
+        load = load or 1e-6 * float(hose.elasticity.axial_stiffness.min())
+        aids = [self._stiffen(aid * load * length**2) for aid in _AIDS]
+        return [(aids[0], scale) for scale in scales] + [(one, 1.0) for one in [*aids[1:], hose]]
+
+    def _stiffen(self, bending_stiffness: float) -> records.Hose:
+        """Returns this hose with a bending stiffness of its own (N m^2)."""
+        elasticity = self.hose.elasticity
+        stiffness = np.full_like(elasticity.bending_stiffness, bending_stiffness)
+        stiff = elasticity._replace(bending_stiffness=stiffness, second_stiffness=stiffness)
+        return self.hose._replace(elasticity=stiff)
+
+    def check_stability(self) -> bool:
+        """Returns whether the present state, an equilibrium, is stable; changes nothing."""
+        twist = self.constraints.rows.twist
+        torque = twist.torque.copy()
+        work = self.build_tangent()
+        length = self.hose.tables.span_length * len(self.hose.tables.first)
+        least_rate = stability.find_least_rate(self.hose, length, work)
+        rows = self.constraints.rows
+        found = stability.is_positive(self.axes, self.hose, rows, least_rate, work)
+        twist.torque[:] = torque
+        return bool(found)
+
     def _iterate(
-        self, scale: float, limits: records.Limits, x: Array, work: records.Work
+        self, hose: records.Hose, scale: float, x: Array, work: records.Work
     ) -> tuple[int, Array]:
         """Newton's iteration at one load; a hose with theta resets its frames now and then."""
         stage = (np.inf, x.copy(), np.zeros_like(x))
         state = integrators.make_state(len(x))
         state.x[:] = x
         has_theta = len(self.axes) == 4
-        if has_theta:
-            limits = limits._replace(max_iterations=_RESET_ITERATIONS)
+        length = self.hose.tables.span_length * len(self.hose.tables.first)
+        most = _RESET_ITERATIONS if has_theta else _STATIC_ITERATIONS
+        limits = records.Limits(_STATIC_TOLERANCE * length, length, most, _STATIC_TURN, False, 1.0)
         rows, verdict = self.constraints.rows, records.NOT_CONVERGED
         for _ in range(_STATIC_ITERATIONS // _RESET_ITERATIONS):
             verdict, more, fell = newton.newton(
-                *(self.axes, self.hose, stage, rows, 1.0, self.loads.loads),
+                *(self.axes, hose, stage, rows, 1.0, self.loads.loads),
                 *(scale, limits, state.x, work),
             )
             self.counts[ITERATIONS] += more

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
+from hose_mj.errors import HoseWarning, InputError
 from hose_mj.hoses.geds import integrators, mechanics, records
-from hose_mj.hoses.geds.body import SplineBody
+from hose_mj.hoses.geds.body import FOLDED, SplineBody
 from hose_mj.hoses.geds.body_coupling import BodyCoupling
 from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
@@ -24,14 +24,22 @@ from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count, check_vector
+from hose_mj.hoses.laying import LARGEST_LAID_STRAIN
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
-from hose_mj.hoses.protocol import Array, Curve, Hold, Linearization, Reaction
+from hose_mj.hoses.protocol import (
+    Array,
+    Curve,
+    Equilibrium,
+    Hold,
+    Linearization,
+    Reaction,
+    warn_of_lost_moment,
+)
+from hose_mj.hoses.snapshots import take, take_array, take_count, undo
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
-
-
 _MOVED = {
     "obstacles": "contacts.obstacles",
     "contact_arc_lengths": "contacts.arc_lengths",
@@ -142,8 +150,9 @@ class GedsHose(SplineBody):
     ) -> None:
         """Puts the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
 
-        The material is free of torque, but for twist="frenet" (docs/frenet.md). A closed loop
-        is open again.
+        The curve is followed at an even pace, whatever its own: the strain is the same all along,
+        and a `HoseWarning` says so where it is above 1 %. The material is free of torque, but for
+        twist="frenet" (docs/frenet.md). A closed loop is open again.
 
         Args:
             curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.
@@ -159,6 +168,16 @@ class GedsHose(SplineBody):
         start = None if director is None else check_vector("director", director)
         self._set_shape(curve, velocity)
         self._start(start)
+        strains = self._measure_strains()[:, 0]
+        largest = float(strains[np.argmax(np.abs(strains))])
+        if abs(largest) > LARGEST_LAID_STRAIN:
+            force = abs(largest) * self.spec.axial_stiffness
+            warnings.warn(
+                f"the hose is laid with a strain of {largest:.2%}, {force:.3g} N of force; lay it "
+                f"along a curve of its length, {self.spec.length:g} m, without corners",
+                HoseWarning,
+                stacklevel=2,
+            )
 
     def set_control_points(self, points: ArrayLike) -> None:
         """Puts the control points at (n, 3) m, at rest, however odd; drops holds and loads.
@@ -189,18 +208,30 @@ class GedsHose(SplineBody):
         """Returns to a snapshot of this hose, or of one with as many control points and unknowns.
 
         Raises:
-            InputError: a snapshot of a hose with another number of unknowns.
+            InputError: what is no snapshot, or one of a hose with another number of unknowns;
+                nothing has changed then.
         """
-        size = len(state["state"]["x"])
+        before = self.snapshot()
+        with undo(lambda: self._restore(before)):
+            self._restore(state)
+
+    def _restore(self, state: dict[str, Any]) -> None:
+        parts = take(state, "state")
+        size = len(take_array(parts, "x", (None,)))
         if size != self._spline.size:
             valid = f"{self._spline.size}, as in this hose"
             raise InputError("number of unknowns in the snapshot", size, valid)
-        self._set_state(integrators.State(**state["state"]))
-        self._spline.offset = state["offset"].copy()
-        self._counts[:] = state["steps"], state["iterations"], state["fallbacks"]
-        self._loads.restore(state["loads"])
-        self._constraints.restore(state["holds"])
-        self.contacts.restore(state["contacts"])
+        shapes = {name: part.shape for name, part in self._state._asdict().items()}
+        read = {name: take_array(parts, name, shape) for name, shape in shapes.items()}
+        offset = take_array(state, "offset", (3,))
+        counts = [take_count(state, name) for name in ("steps", "iterations", "fallbacks")]
+        self._set_state(integrators.State(**read))
+        self._spline.offset = offset
+        self._counts[:] = counts
+        self._loads.restore(take(state, "loads"))
+        self._constraints.restore(take(state, "holds"))
+        self._constraints.set_moments(self._loads.list_moments())
+        self.contacts.restore(take(state, "contacts"))
         self.contacts.set_closed(self.is_closed)
 
     # -- holds and loads ---------------------------------------------------------------------------
@@ -295,8 +326,15 @@ class GedsHose(SplineBody):
         self._loads.add_force(arc_length, force)
 
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
-        """Adds a point moment (3,) N m until `clear_loads`; what lies along the tangent is lost."""
+        """Adds a point moment (3,) N m until `clear_loads`; its part along the tangent twists.
+
+        A hose without torsional stiffness carries no such part, and says so (`HoseWarning`).
+        """
         self._loads.add_moment(arc_length, moment)
+        self._constraints.set_moments(self._loads.list_moments())
+        if self.spec.torsional_stiffness == 0.0 and self._spline.dimension == 3:
+            place, vector = self._loads.list_moments()[-1]
+            warn_of_lost_moment(vector, self.tangent(place)[0], place, stacklevel=3)
 
     def set_push(self, arc_lengths: ArrayLike, forces: ArrayLike) -> None:
         """Replaces the forces (k, 3), N, by which a neighbour pushes at arc lengths (k,), m.
@@ -312,6 +350,7 @@ class GedsHose(SplineBody):
     def clear_loads(self) -> None:
         """Drops all point forces and moments; gravity stays."""
         self._loads.clear()
+        self._constraints.set_moments([])
 
     # -- motion ------------------------------------------------------------------------------------
 
@@ -325,10 +364,13 @@ class GedsHose(SplineBody):
         if check_count("n_steps", n_steps, 0) > 0:
             self._dynamics.advance(int(n_steps))
 
-    def solve_static(self, load_steps: int = 1) -> None:
+    def solve_static(self, load_steps: int = 1) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.
 
         The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
+        An equilibrium that is unstable or folded is said by a `HoseWarning` too. It counts as
+        unstable where a disturbance grows faster than some hundredth of the slowest bending motion;
+        where a moment acts in space the symmetric part of the stiffness decides.
 
         Raises:
             InputError: load_steps is not a whole number from 1 to 64; a closed loop that nothing
@@ -340,6 +382,10 @@ class GedsHose(SplineBody):
             valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
             raise InputError("holds of a closed loop", "none", valid)
         self._dynamics.solve_static(int(load_steps))
+        least = self.measure_least_stretch()
+        found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
+        found.warn(stacklevel=3)
+        return found
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and constraint rows in the control points' n d coordinates."""

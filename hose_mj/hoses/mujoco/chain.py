@@ -26,7 +26,7 @@ from hose_mj.hoses.mujoco.chain_settings import ChainSettings, add_obstacles
 from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.mujoco.statics import BodyPoint, ChainSystem, StaticChain, solve_equilibrium
-from hose_mj.hoses.protocol import Array, Reaction
+from hose_mj.hoses.protocol import Array, Equilibrium, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 _ADVICE = (
@@ -163,14 +163,15 @@ class ChainModel(MujocoModel[ChainMotion]):
         tangents = motion.tangent(self.layout.nodes[1:-1])
         return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
 
-    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
-        """Moves to static equilibrium, velocity zero."""
+    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> bool:
+        """Moves to static equilibrium, velocity zero; returns whether it is stable."""
         system = self._static_system(held, loads)
-        multipliers = solve_equilibrium(system)
+        multipliers, is_stable = solve_equilibrium(system)
         self.write_targets(held)
         self.data.qpos[:] = system.data.qpos
         self.data.qvel[:], self.data.qacc_warmstart[:] = 0.0, 0.0
         self.keep_settled(multipliers, held)
+        return is_stable
 
     # What acts on it, and steps.
 
@@ -248,7 +249,7 @@ class MujocoChainHose(MujocoHose):
     def _is_root(self, arc_length: float) -> bool:
         return arc_length == 0.0
 
-    def solve_static(self) -> None:
+    def solve_static(self) -> Equilibrium:
         """Moves the hose to static equilibrium; see `MujocoHose.solve_static`.
 
         Raises:
@@ -257,7 +258,7 @@ class MujocoChainHose(MujocoHose):
         """
         if self.settings.obstacles:
             raise InputError("obstacles", len(self.settings.obstacles), "none in a chain's statics")
-        super().solve_static()
+        return super().solve_static()
 
 
 def check_plain(name: str, spec: HoseSpec) -> None:

@@ -340,10 +340,16 @@ class ConstraintSet:
         self._moments = list(moments)
         self.rows = self.rows._replace(twist=self._load(self.rows.twist))
 
-    @property
-    def is_held_in_twist(self) -> bool:
-        """Whether a clamp, or theta, takes up the moments about the tangent."""
-        return self._spline.has_theta or any(held.tangent is not None for held in self._held)
+    def measure_unbalanced_torque(self) -> float:
+        """Returns the sum of the moments about the tangent (N m) where no clamp takes it up.
+
+        Zero where one does, and for what is no more than rounding.
+        """
+        moments = self.rows.twist.load_moments
+        if len(moments) == 0 or any(held.tangent is not None for held in self._held):
+            return 0.0
+        rest = float(self._measure_moments().sum())
+        return rest if abs(rest) > 1e-6 * float(np.abs(moments).sum()) else 0.0
 
     def tabulate_applied(self) -> AppliedTorque:
         """Returns what the point moments make of the moment about the tangent."""

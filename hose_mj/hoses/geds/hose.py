@@ -362,6 +362,7 @@ class GedsHose(SplineBody):
             StepError: a step that no fallback finished; the last step that worked is kept.
         """
         if check_count("n_steps", n_steps, 0) > 0:
+            self._warn_of_spin()
             self._dynamics.advance(int(n_steps))
 
     def solve_static(self, load_steps: int = 1) -> Equilibrium:
@@ -381,6 +382,7 @@ class GedsHose(SplineBody):
         if self.is_closed and self._constraints.is_free:
             valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
             raise InputError("holds of a closed loop", "none", valid)
+        self._warn_of_spin()
         self._dynamics.solve_static(int(load_steps))
         least = self.measure_least_stretch()
         found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
@@ -428,6 +430,18 @@ class GedsHose(SplineBody):
                 f"GedsHose.{name} is now GedsHose.{moved}", DeprecationWarning, stacklevel=2
             )
             return operator.attrgetter(moved)(self)
+
+    def _warn_of_spin(self) -> None:
+        """Says that moments about the tangent have nothing that would balance them, if so."""
+        rest = self._constraints.measure_unbalanced_torque()
+        if rest != 0.0:
+            warnings.warn(
+                f"nothing holds the hose against turning about its axis by moments of {rest:.3g} N m "
+                "together: it would spin ever faster, which the scalar twist does not show; clamp it, "
+                'or make it with twist="theta"',
+                HoseWarning,
+                stacklevel=3,
+            )
 
     def _start(self, director: Array | None = None) -> None:
         self._counts[STEPS] = 0

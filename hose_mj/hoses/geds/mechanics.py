@@ -26,6 +26,10 @@ def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
     """Returns True for a hose with theta; raises `InputError` for a form that cannot do it."""
     if form not in (None, "scalar", "theta", "frenet"):
         raise InputError("twist", form, "None, scalar, theta, frenet")
+    stiffened = any(fitting.bending_stiffness is not None for fitting in spec.fittings)
+    if spec.bending_stiffness == 0.0 and (stiffened or not spec.is_isotropic):
+        valid = "above 0 for a hose with a rest curvature, a second stiffness or a fitting's"
+        raise InputError("bending_stiffness", 0.0, valid)
     if plane is not None:
         if form is not None:
             raise InputError("twist", form, "None for a hose in a plane")
@@ -33,9 +37,6 @@ def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
     if form in ("scalar", "frenet") and not spec.is_isotropic:
         valid = "theta for a hose that is curved at rest or bends unequally"
         raise InputError("twist", form, valid)
-    if spec.bending_stiffness == 0.0 and not spec.is_isotropic:
-        valid = "a number above 0 for a hose that is curved at rest or bends unequally"
-        raise InputError("bending_stiffness", 0.0, valid)
     if form in ("theta", "frenet") and spec.torsional_stiffness == 0.0:
         raise InputError("torsional_stiffness", 0.0, f"a number above 0 with {form}")
     return form in ("theta", "frenet") or not spec.is_isotropic

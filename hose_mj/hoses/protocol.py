@@ -244,6 +244,14 @@ class HoseModel(Protocol):
         """Unit tangent, shape (k, 3)."""
         ...
 
+    def frame(self, arc_length: ArrayLike) -> Array:
+        """Rotation matrices (k, 3, 3) of the material: columns t, m1 and m2 = t x m1.
+
+        The directors go with the material where clamps hold it; in a model without twist they are
+        any across the tangent.
+        """
+        ...
+
     def tension(self, arc_length: ArrayLike) -> Array:
         """Axial force, positive in tension, shape (k,), N."""
         ...

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, energy, frames, integrators, mechanics
+from hose_mj.hoses.geds import basis, energy, frames, integrators, material_frames, mechanics
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
@@ -79,6 +79,33 @@ class SplineBody:
         """Unit tangent, shape (k, 3), world frame."""
         slope = self._evaluate(arc_length, self._state.x, 1)
         return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12))
+
+    def frame(self, arc_length: ArrayLike) -> Array:
+        """Rotation matrices (k, 3, 3) of the material; columns: tangent, m1, m2 = t x m1.
+
+        In space m1 goes with what clamps hold and with the twist between them. Where no clamp is, a
+        hose without theta does not know how its material is turned: m1 is then any direction
+        without twist. In a plane m1 is the plane's normal.
+
+        Raises:
+            InputError: places off the hose; a hose with twist="frenet".
+        """
+        s = check_arc_lengths(arc_length, self.spec.length)
+        tangents, x, rows = self.tangent(s), self._state.x, self._constraints.rows
+        if self._hose.elasticity.frenet:
+            raise InputError("twist", "frenet", "scalar or theta for a hose asked for its frame")
+        if self._spline.dimension == 2:
+            directors = np.tile(self._spline.normal, (len(s), 1))
+        elif self._spline.has_theta:
+            directors = material_frames.interpolate_directors(
+                self._spline, self._hose, rows.twist, s, x, tangents
+            )
+        else:
+            place, director = self._constraints.find_director()
+            directors = material_frames.transport_along(self._spline, x, place, director, s)
+            angles = self._constraints.measure_turns(place, s)
+            directors = material_frames.turn_about(tangents, directors, angles)
+        return material_frames.make_matrices(tangents, directors)
 
     def tension(self, arc_length: ArrayLike) -> Array:
         """Axial force, shape (k,), N: linear between the means of the spans' middles."""

@@ -216,7 +216,7 @@ class ConstraintSet:
         now = twist_segments.transport_director(tangent, held.tangent, now)
         angle = float(np.arctan2(np.cross(now, director) @ held.tangent, now @ director))
         if self._spline.has_theta or len(self._clamps) > 1:
-            twist.spin[clamp, 0] += angle
+            twist.spin[clamp, 0] = angle
         else:
             # Nothing else knows the angle of a hose without theta.
             twist_segments.turn_director(twist, clamp, angle)
@@ -359,6 +359,37 @@ class ConstraintSet:
             for one in shares
         ]
         return AppliedTorque.add_up(self._spline.length, stretches)
+
+    def find_director(self) -> tuple[float, Array]:
+        """Returns where a hose with scalar twist knows a director, and that (3,).
+
+        At its first clamp; without clamps any at s = 0.
+        """
+        twist, length = self.rows.twist, self._hose.tables.span_length
+        for clamp, number in enumerate(self._clamps):
+            if number >= 0:
+                return float(twist.places[clamp]) * length, twist.directors[clamp, 3:].copy()
+        slope = self._spline.evaluate(np.zeros(1), self._x, 1)[0]
+        unit = slope / max(float(np.linalg.norm(slope)), 1e-12)
+        return 0.0, twist_segments.compute_normal(unit)
+
+    def measure_turns(self, start: float, places: Array) -> Array:
+        """Returns the twist (k,), rad, from one arc length to others."""
+        twist, applied = self.rows.twist, self.tabulate_applied()
+        n_spans = len(self._hose.tables.first)
+        torque = (twist.angle / twist.compliance)[find_owners(twist)]
+        ends = twist.places[twist.ends] * self._hose.tables.span_length
+        turns = np.zeros(len(places))
+        for k, place in enumerate(places):
+            low, high = min(start, float(place)), max(start, float(place))
+            angle = applied.integrate(self._spline, self._hose, low, high)
+            for (first, last), moment in zip(ends, torque, strict=True):
+                if low < last and first < high:
+                    part = (self._spline, n_spans, max(low, first), min(high, last))
+                    weights = twist_segments.make_weights(*part)
+                    angle += moment * twist_segments.measure_compliance(self._hose, weights)
+            turns[k] = angle if place >= start else -angle
+        return turns
 
     def _measure_moments(self) -> Array:
         """The point moments' parts along the tangent that twist, (k,), N m."""

@@ -22,6 +22,7 @@ from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
+from hose_mj.hoses.geds.material_frames import check_rotation
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.laying import LARGEST_LAID_STRAIN
@@ -268,15 +269,31 @@ class GedsHose(SplineBody):
         position: ArrayLike | None = None,
         tangent: ArrayLike | None = None,
         spin: float = 0.0,
+        frame: ArrayLike | None = None,
     ) -> None:
         """Sets where a hold is to be at the end of the next step: position (3,) m, tangent (3,).
 
         A clamp's material goes along by the smallest rotation to the new tangent and is turned by
-        `spin` (rad, right-handed about the tangent, any number of turns) on top. Raises
-        `InputError` for a hold that was released, a tangent or a spin for an attachment, vectors
-        out of a planar hose's plane.
+        `spin` (rad, right-handed about the tangent, any number of turns) on top. A `frame` says all
+        of that at once: a rotation matrix (3, 3) as `frame` gives it, to which the material turns
+        by less than half a turn. Raises `InputError` for a hold that was released, a tangent, a
+        spin or a frame for an attachment, vectors out of a planar hose's plane, a frame that is no
+        rotation or comes with a tangent or a spin.
         """
-        self._constraints.move(hold, position, tangent, spin)
+        if frame is None:
+            self._constraints.move(hold, position, tangent, spin)
+            return
+        axes = check_rotation("frame", frame)
+        if tangent is not None or spin != 0.0:
+            raise InputError.about(
+                "a clamp moved by a frame takes no tangent and no spin beside it"
+            )
+        if self._spline.dimension == 2:
+            self._constraints.move(hold, position, axes[:, 0], 0.0)
+            return
+        across = self._constraints.check_director(axes[:, 1], axes[:, 0])
+        self._constraints.move(hold, position, axes[:, 0], 0.0)
+        self._constraints.turn_to(hold, across)
 
     @property
     def holds(self) -> list[Hold]:
@@ -436,9 +453,9 @@ class GedsHose(SplineBody):
         rest = self._constraints.measure_unbalanced_torque()
         if rest != 0.0:
             warnings.warn(
-                f"nothing holds the hose against turning about its axis by moments of {rest:.3g} N m "
-                "together: it would spin ever faster, which the scalar twist does not show; clamp it, "
-                'or make it with twist="theta"',
+                f"nothing holds the hose against turning about its axis by {rest:.3g} N m: it "
+                "would spin ever faster, which the scalar twist does not show; clamp it, or make "
+                'it with twist="theta"',
                 HoseWarning,
                 stacklevel=3,
             )

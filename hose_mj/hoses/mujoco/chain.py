@@ -26,7 +26,7 @@ from hose_mj.hoses.mujoco.chain_settings import ChainSettings, add_obstacles
 from hose_mj.hoses.mujoco.hose import MujocoHose
 from hose_mj.hoses.mujoco.model import MujocoModel
 from hose_mj.hoses.mujoco.statics import BodyPoint, ChainSystem, StaticChain, solve_equilibrium
-from hose_mj.hoses.protocol import Array, Equilibrium, Reaction
+from hose_mj.hoses.protocol import Array, Reaction
 from hose_mj.hoses.spec import HoseSpec
 
 _ADVICE = (
@@ -249,16 +249,10 @@ class MujocoChainHose(MujocoHose):
     def _is_root(self, arc_length: float) -> bool:
         return arc_length == 0.0
 
-    def solve_static(self) -> Equilibrium:
-        """Moves the hose to static equilibrium; see `MujocoHose.solve_static`.
-
-        Raises:
-            InputError: a chain with obstacles, which must come to rest by itself.
-            StepError: no equilibrium was found; the state before is kept.
-        """
+    def _check_static(self) -> None:
+        """A chain with obstacles must come to rest by itself."""
         if self.settings.obstacles:
             raise InputError("obstacles", len(self.settings.obstacles), "none in a chain's statics")
-        return super().solve_static()
 
 
 def check_plain(name: str, spec: HoseSpec) -> None:
@@ -266,6 +260,8 @@ def check_plain(name: str, spec: HoseSpec) -> None:
     for what in ("rest_strain", "rest_curvature", "rest_torsion", "drag"):
         if getattr(spec, what) != 0.0:
             raise InputError(what, getattr(spec, what), f"0 for a {name}")
+    if spec.bending_stiffness == 0.0:
+        raise InputError("bending_stiffness", 0.0, f"above 0 for a {name}")
     if spec.fittings or not spec.is_isotropic:
         what = "fittings" if spec.fittings else "second_bending_stiffness"
         raise InputError(what, getattr(spec, what), f"none for a {name}")

@@ -102,6 +102,15 @@ class MujocoHose(ABC):
         """Unit tangent, shape (k, 3): the segment's, at a node the mean of its neighbours'."""
         return self._model.motion().tangent(self._arc_lengths(arc_length))
 
+    def frame(self, arc_length: ArrayLike) -> Array:
+        """Rotation matrices (k, 3, 3) of the segments; columns: tangent and two directors.
+
+        Of a hose without twist the directors are any.
+        """
+        places = self._arc_lengths(arc_length)
+        frames = [self._model.motion().frame(float(s)) for s in places]
+        return np.array([chain_layout.rotation_matrix(one) for one in frames]).reshape(-1, 3, 3)
+
     def curvature(self, arc_length: ArrayLike) -> Array:
         """Bending per length at the nodes (k,), 1/m: straight lines between and beyond them."""
         return self._model.motion().curvature(self._arc_lengths(arc_length))
@@ -262,8 +271,10 @@ class MujocoHose(ABC):
         not where a moment acts; a `HoseWarning` says so. A chain of rigid parts cannot fold within.
 
         Raises:
+            InputError: a chain with obstacles.
             StepError: no equilibrium was found; the state before is kept.
         """
+        self._check_static()
         found = Equilibrium(self._model.settle(self._held, self._loads), False, 1.0)
         self._held = [held.arrived() for held in self._held]
         found.warn(stacklevel=3)
@@ -322,6 +333,10 @@ class MujocoHose(ABC):
     def _check_direction(self, tangent: Array) -> Array:
         """Returns a unit tangent (3,); raises `InputError` for one that this hose cannot have."""
         return tangent
+
+    def _check_static(self) -> None:
+        """Raises `InputError` for a hose that cannot be solved for its equilibrium."""
+        return None
 
     def _is_root(self, arc_length: float) -> bool:
         """Whether a clamp there makes a part of the hose part of the world while it is at rest."""

@@ -1,4 +1,6 @@
-"""A hose without bending stiffness is a chain: it hangs, swings and lies, and no NaN comes of it."""
+"""A hose without bending stiffness is a chain: it hangs and swings, and no NaN comes of it."""
+
+import contextlib
 
 import numpy as np
 import pytest
@@ -107,16 +109,14 @@ def test_a_chain_without_weight_is_no_nan():
     hose.attach(0.0), hose.attach(1.0)
     hose.step(20)
     assert np.all(np.isfinite(hose.control_points))
-    try:
+    with contextlib.suppress(StepError):
         hose.solve_static()
-    except StepError:
-        pass
     assert np.all(np.isfinite(hose.control_points))
 
 
 def test_what_bends_unequally_is_no_chain():
     for changes in ({"rest_curvature": 1.0}, {"second_bending_stiffness": 1.0}):
-        with pytest.raises(InputError, match="bending_stiffness is 0.0"):
+        with pytest.raises(InputError, match=r"bending_stiffness is 0\.0"):
             make_chain(**changes)
     with pytest.raises(InputError, match="bending_stiffness"):
         make_chain(fittings=(Fitting(start=0.2, end=0.4, bending_stiffness=1.0),))

@@ -57,7 +57,9 @@ def test_an_even_curve_is_taken_as_it_is():
 
 def test_strain_as_laid_is_said():
     hose = GedsHose(SPEC, control_points=12)
-    with pytest.warns(HoseWarning, match=r"laid with a strain of -2\.00%, 2e\+04 N of force") as said:
+    with pytest.warns(
+        HoseWarning, match=r"laid with a strain of -2\.00%, 2e\+04 N of force"
+    ) as said:
         hose.reset([[0, 0, 0], [0.98, 0, 0]])
     assert said[0].filename == __file__
     with pytest.warns(HoseWarning, match=r"strain of 3\.00%"):

@@ -1,4 +1,4 @@
-"""Moments along the tangent of a hose with scalar twist: shares, balance, holds that come and go."""
+"""Moments along the tangent of a hose with scalar twist: shares, balance, changing holds."""
 
 import numpy as np
 import pytest

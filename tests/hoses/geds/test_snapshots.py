@@ -45,7 +45,9 @@ def assert_same(found, wanted):
 
 def make_hose(kind, **options):
     hose = GedsHose(HoseSpec(**PLAIN | KINDS[kind]), timestep=2e-3, control_points=12, **options)
-    hose.reset(lambda s: np.stack([0.8 * s, 0.25 * np.cos(2.4 * s), 0.25 * np.sin(2.4 * s)], axis=1))
+    hose.reset(
+        lambda s: np.stack([0.8 * s, 0.25 * np.cos(2.4 * s), 0.25 * np.sin(2.4 * s)], axis=1)
+    )
     return hose
 
 
@@ -55,8 +57,8 @@ def carry(hose, hold, first, count):
     tangent = np.array([0.8, -0.6 * np.sin(2.4), 0.6 * np.cos(2.4)])
     for k in range(first, first + count):
         turn = 0.01 * k
-        aim = tangent + [0.0, 0.3 * np.sin(turn), 0.2 * turn]
-        hose.move(hold, at + [-1e-3 * k, 5e-4 * k, 0.0], aim, 0.03)
+        aim = tangent + np.array([0.0, 0.3 * np.sin(turn), 0.2 * turn])
+        hose.move(hold, at + np.array([-1e-3 * k, 5e-4 * k, 0.0]), aim, 0.03)
         hose.step()
 
 

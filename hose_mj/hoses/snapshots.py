@@ -49,6 +49,14 @@ def take_count(state: Any, key: str) -> int:
     return int(value)
 
 
+def take_flag(state: Any, key: str) -> bool:
+    """Returns True or False; raises `InputError` for anything else."""
+    value = take(state, key)
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{key} of a snapshot", type(value).__name__, "True or False")
+    return bool(value)
+
+
 def take_list(state: Any, key: str) -> list[Any]:
     """Returns a list or tuple as a list; raises `InputError` for anything else."""
     value = take(state, key)

@@ -27,7 +27,7 @@ from hose_mj.hoses.geds.twist import Twist, find_owners
 from hose_mj.hoses.geds.twist_loads import AppliedTorque, Stretch
 from hose_mj.hoses.inputs import check_vector
 from hose_mj.hoses.protocol import Array, Hold, Reaction
-from hose_mj.hoses.snapshots import take, take_array, take_count, take_list
+from hose_mj.hoses.snapshots import take, take_array, take_count, take_flag, take_list
 from hose_mj.hoses.spec import check_number
 
 _REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "accepted")
@@ -440,10 +440,12 @@ class ConstraintSet:
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot; raises `InputError` for one of another hose, half restored."""
         held = [self._read_held(one) for one in take_list(state, "held")]
-        was_closed, self.is_closed = self.is_closed, bool(take(state, "is_closed"))
+        is_closed = take_flag(state, "is_closed")
+        self._check_apart(held, is_closed)
+        was_closed, self.is_closed = self.is_closed, is_closed
         if was_closed != self.is_closed or _list_clamps(held) != _list_clamps(self._held):
             # Other clamps may have the same numbers: nothing goes on from those of now.
-            self._held, self._clamps = [], []
+            self._held, self._clamps, self._moments, self._shares = [], [], [], []
             twist = twist_segments.make_twist(self._spline, self._hose, [], self._x)
             self.rows = self._make_rows(twist)
         self._held = held
@@ -456,12 +458,21 @@ class ConstraintSet:
             part = getattr(rows.twist, name)
             part[:] = take_array(twist, name, part.shape)
         rows.twist.frames[:] = rows.twist.accepted
-        compliant = take_list(state, "compliant")
+        compliant, forces = take_list(state, "compliant"), take_array(state, "mean_force", (None,))
         if compliant:
             numbers = {one.hold.number: one.hold for one in self._held}
             self.set_compliance([numbers[number] for number in compliant])
-            force = self.rows.response.force
-            force[:] = take_array(state, "mean_force", force.shape)
+            self.rows.response.force[:] = forces
+
+    def _check_apart(self, held: Sequence[_Held], is_closed: bool) -> None:
+        """Raises `InputError` for holds of a snapshot that no hose can have together."""
+        places = sorted(one.hold.arc_length for one in held)
+        if is_closed and places:
+            places.append(places[0] + self._spline.length)
+        if is_closed and self._spline.has_theta:
+            raise InputError("is_closed of a snapshot", is_closed, "False for a hose with theta")
+        if np.any(np.diff(places) < 1e-9 * self._spline.length):
+            raise InputError("arc lengths of the holds of a snapshot", places, "places apart")
 
     def _read_held(self, one: Any) -> _Held:
         """Returns a hold from its entry of a snapshot."""

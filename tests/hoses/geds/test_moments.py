@@ -131,7 +131,8 @@ def test_without_a_clamp_the_moment_is_spent_on_a_spin():
     hose = make_hose()
     hose.attach(0.0), hose.attach(1.0)
     hose.apply_moment(0.4, [0.01, 0.0, 0.0])
-    hose.step()
+    with pytest.warns(HoseWarning, match="nothing holds the hose against turning"):
+        hose.step()
     np.testing.assert_allclose(hose.torque([0.2, 0.7, 1.0]), [0.002, -0.003, 0.0], atol=1e-9)
     with pytest.warns(HoseWarning, match="nothing holds the hose against turning"):
         hose.solve_static()
@@ -155,10 +156,10 @@ def test_a_loop_shares_a_moment_both_ways_round():
 
 
 def test_energy_of_a_moment_that_is_switched_on_and_damped():
-    hose = make_hose(damping_time=0.02, options={"timestep": 2e-3})
+    hose = make_hose(damping_time=0.02, drag=0.5, options={"timestep": 2e-3})
     clamp = hose.clamp(0.0)
     hose.apply_moment(1.0, [0.01, 0.004, 0.0])
-    hose.step(2000)
+    hose.step(5000)
     moved = hose.position(1.0)[0].copy()
     rest = hose.reaction(clamp).moment
     hose.solve_static()

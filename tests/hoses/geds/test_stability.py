@@ -64,12 +64,12 @@ def test_what_nothing_resists_is_not_unstable(n):
     assert hanging.solve_static().is_stable
     # Between two attachments a bent hose may turn about the line through them.
     sagging = make_hose(control_points=n, gravity=gravity)
-    sagging.reset(lambda s: np.stack([0.95 * s, 0.0 * s, -0.75 * s * (1.0 - s)], axis=1))
-    sagging.attach(0.0, [0, 0, 0])
-    sagging.attach(1.0, [0.9, 0, 0])
+    points = np.linspace(0.0, 1.0, 200)[:, None] * [1.0, 0.0, 0.0]
+    points[:, 2] = -0.8 * points[:, 0] * (1.0 - points[:, 0])
+    points /= np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    sagging.reset(points)
+    sagging.attach(0.0), sagging.attach(1.0)
     assert sagging.solve_static().is_stable
-    free = make_hose(control_points=n)
-    assert free.solve_static().is_stable
 
 
 def test_a_hose_that_stands_on_end_is_unstable_and_hanging_it_is_not():
@@ -104,6 +104,7 @@ def test_a_fold_is_told():
     hose.set_control_points(points)
     assert hose.measure_least_stretch() < 0.1
     hose.reset([[0, 0, 0], [1, 0, 0]])
+    hose.clamp(0.0)
     assert hose.measure_least_stretch() == pytest.approx(1.0)
     found = settle(hose)
     assert (found.is_folded, found.least_stretch) == (False, pytest.approx(1.0))

@@ -18,17 +18,18 @@ LARGEST_LAID_STRAIN = 0.01
 def even_out(curve: Curve, length: float) -> Curve:
     """Returns a curve that goes as far in every metre of the hose.
 
-    Rows of points are followed by their own length anyway. What is wrong with a curve, but for its
-    length, is left to `inputs.sample_curve` to say.
+    Rows of points are followed by their own length anyway. What is wrong with the points of a curve
+    is left to `inputs.sample_curve` to say.
 
     Raises:
-        InputError: a function whose length is outside 0.5 to 2 times the hose's.
+        InputError: what is neither numbers nor gives any; a function whose length is outside 0.5 to
+            2 times the hose's.
     """
     if not callable(curve):
-        return curve
+        return _read_points("curve", curve)
     follow = curve
     at = np.linspace(0.0, length, _CHORDS + 1)
-    points = np.asarray(follow(at), dtype=np.float64)
+    points = _read_points("curve(arc_lengths)", follow(at))
     if points.shape != (len(at), 3) or not np.all(np.isfinite(points)):
         return curve
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -45,3 +46,10 @@ def even_out(curve: Curve, length: float) -> Curve:
         return np.asarray(follow(np.clip(find_parameter(s), 0.0, length)), dtype=np.float64)
 
     return evenly
+
+
+def _read_points(name: str, points: object) -> Array:
+    try:
+        return np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(name, points, "an array of shape (k, 3), m") from None

@@ -21,8 +21,10 @@ def take(state: Any, key: str) -> Any:
     return state[key]
 
 
-def take_array(state: Any, key: str, shape: tuple[int | None, ...]) -> Array:
-    """Returns a copy of finite numbers of that shape, None for any length; else `InputError`."""
+def take_array(
+    state: Any, key: str, shape: tuple[int | None, ...], *, is_finite: bool = True
+) -> Array:
+    """Returns a copy of (finite) numbers of that shape, None for any length; else `InputError`."""
     value = take(state, key)
     try:
         array = np.array(value, dtype=np.float64)
@@ -34,7 +36,7 @@ def take_array(state: Any, key: str, shape: tuple[int | None, ...]) -> Array:
     )
     if not fits:
         raise InputError(f"shape of {key} of a snapshot", array.shape, f"{shape}, as in this hose")
-    if not np.all(np.isfinite(array)):
+    if is_finite and not np.all(np.isfinite(array)):
         raise InputError(f"{key} of a snapshot", "not finite", "finite numbers")
     return array
 

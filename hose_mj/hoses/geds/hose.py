@@ -232,7 +232,12 @@ class GedsHose(SplineBody):
         self._loads.restore(take(state, "loads"))
         self._constraints.restore(take(state, "holds"))
         self._constraints.set_moments(self._loads.list_moments())
-        self.contacts.restore(take(state, "contacts"))
+        contacts = take(state, "contacts")
+        for name, part in self.contacts.snapshot().items():
+            if isinstance(part, np.ndarray):
+                rows = take_array(contacts, name, (None, *part.shape[1:]), is_finite=False)
+                contacts = contacts | {name: rows}
+        self.contacts.restore(contacts)
         self.contacts.set_closed(self.is_closed)
 
     # -- holds and loads ---------------------------------------------------------------------------
@@ -387,8 +392,9 @@ class GedsHose(SplineBody):
 
         The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
         An equilibrium that is unstable or folded is said by a `HoseWarning` too. It counts as
-        unstable where a disturbance grows faster than some hundredth of the slowest bending motion;
-        where a moment acts in space the symmetric part of the stiffness decides.
+        unstable where a disturbance grows faster than some hundredth of the slowest bending motion.
+        A moment that acts in space has no energy: the symmetric part of the stiffness decides then,
+        which may err, and no warning is given.
 
         Raises:
             InputError: load_steps is not a whole number from 1 to 64; a closed loop that nothing
@@ -403,7 +409,8 @@ class GedsHose(SplineBody):
         self._dynamics.solve_static(int(load_steps))
         least = self.measure_least_stretch()
         found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
-        found.warn(stacklevel=3)
+        if found.is_folded or self._spline.dimension == 2 or not self._loads.list_moments():
+            found.warn(stacklevel=3)
         return found
 
     def linearize(self) -> Linearization:

@@ -18,7 +18,7 @@ NEXT := $(NEXT_VENV)/.installed
 comma := ,
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow smoke-mujoco4 test-mujoco4 test-matrix lint clean
+.PHONY: help demo test test-slow test-bounds smoke-mujoco4 test-mujoco4 test-matrix lint clean
 
 help:
 	@echo 'make demo        install, then compare the hose models in short form (report in out/demo)'
@@ -26,6 +26,8 @@ help:
 	@echo 'make test        install with the dev extra, then ruff, mypy, pytest, and the smoke tests'
 	@echo '                 under MuJoCo 4 (smoke-mujoco4); PYTEST_ARGS="tests/cli -x" goes to pytest'
 	@echo 'make test-slow   only the slow tests, which make test leaves out'
+	@echo 'make test-bounds   the tests of the spline hose and the contracts with checked array indices (slow:'
+	@echo '                 all kernels are compiled anew, into .numba-bounds)'
 	@echo 'make test-mujoco4  the smoke tests, the flex rod and the contracts of all models under MuJoCo 4,'
 	@echo '                 in a virtual environment of its own'
 	@echo 'make test-matrix   each Python here, times MuJoCo 3.17 and 4, in fresh environments (slow);'
@@ -48,6 +50,14 @@ test: lint
 test-slow: $(DEV)
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 
+# A kernel that reads or writes beside an array raises IndexError. Numba's key of a compiled kernel
+# does not know of the checks, hence a cache of its own.
+test-bounds: $(DEV)
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/.numba-bounds \
+	  $(BIN)/python -m pytest --numprocesses $(PYTEST_WORKERS) --dist loadfile $(PYTEST_ARGS) \
+	  tests/hoses/geds tests/contracts/test_hose_models.py \
+	  tests/contracts/test_moments_and_statics.py tests/contracts/test_random_calls.py
+
 # Under MuJoCo 4 dm-control does not load and the composite cable is gone: what is left has to run.
 smoke-mujoco4: $(NEXT)
 	$(NEXT_BIN)/python -m pytest -m 'not slow' tests/hoses/mujoco/test_mujoco4.py
@@ -66,7 +76,7 @@ lint: $(DEV)
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) $(NEXT_VENV) build dist out/demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(NEXT_VENV) .numba-bounds build dist out/demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find hose_mj learning tools tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # A candidate counts only if it runs and is of a version we support: a name on the PATH may be a

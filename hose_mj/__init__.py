@@ -20,7 +20,7 @@ from hose_mj.version import __version__
 if TYPE_CHECKING:
     from hose_mj.constraints.limits import Limits
     from hose_mj.constraints.monitor import Monitor
-    from hose_mj.errors import HoseError, InputError, StepError
+    from hose_mj.errors import HoseError, HoseWarning, InputError, StepError
     from hose_mj.hoses.obstacles import ContactLaw, Obstacle
     from hose_mj.hoses.protocol import Hold, HoseModel
     from hose_mj.hoses.registry import make_hose
@@ -37,6 +37,7 @@ __all__ = [
     "HoseError",
     "HoseModel",
     "HoseSpec",
+    "HoseWarning",
     "InputError",
     "Limits",
     "Monitor",
@@ -57,6 +58,7 @@ _HOMES = {
     "HoseError": "hose_mj.errors",
     "HoseModel": "hose_mj.hoses.protocol",
     "HoseSpec": "hose_mj.hoses.spec",
+    "HoseWarning": "hose_mj.errors",
     "InputError": "hose_mj.errors",
     "Limits": "hose_mj.constraints.limits",
     "Monitor": "hose_mj.constraints.monitor",

@@ -42,6 +42,13 @@ class StepError(HoseError, RuntimeError):
     """A time step or a static solve that no fallback could finish; the state before it is kept."""
 
 
+class HoseWarning(UserWarning):
+    """A result that is computed as asked and may not be what is wanted; it says what to do.
+
+    ``warnings.simplefilter("error", HoseWarning)`` makes an exception of it.
+    """
+
+
 def check_choice(name: str, value: object, valid: Collection[str]) -> None:
     """Raises `InputError` unless `value` is one of the valid words."""
     if not isinstance(value, str) or value not in valid:

@@ -144,7 +144,8 @@ class ContactLaw:
 
         Of what its ramp carries: half of k times the width at most, far above a hose's weight.
         """
-        assert self.stiffness is not None and self.width is not None
+        assert self.stiffness is not None
+        assert self.width is not None
         return float(self.width - np.sqrt(4.0 * self.width * load / self.stiffness))
 
 

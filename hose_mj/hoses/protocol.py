@@ -7,6 +7,7 @@ answers with a leading axis k.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -14,12 +15,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hose_mj.errors import HoseWarning
 from hose_mj.hoses.spec import HoseSpec
 
 Array = NDArray[np.float64]
 Curve = ArrayLike | Callable[[Array], ArrayLike]
 """Points along the hose from s = 0 to s = L, shape (k, 3), spaced as they like; or a function of
-arc lengths (k,) that returns positions (k, 3)."""
+arc lengths (k,) that returns positions (k, 3), at whatever pace. The hose is laid along either at
+an even pace."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,48 @@ class Momentum:
 
     linear: Array
     angular: Array
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """What `solve_static` has found.
+
+    Attributes:
+        is_stable: whether it comes back after any small disturbance; neutral counts as stable.
+        is_folded: whether the hose is folded onto itself somewhere, |r'| near 0: no shape of a real
+            hose.
+        least_stretch: least |r'| along the hose; 1 where it is as long as at rest.
+    """
+
+    is_stable: bool
+    is_folded: bool
+    least_stretch: float
+
+    def warn(self, stacklevel: int) -> None:
+        """Says by a `HoseWarning` what is wrong with it, if anything."""
+        if self.is_folded:
+            text = (
+                f"the equilibrium found is folded: |r'| falls to {self.least_stretch:.2g} (1 is as "
+                "long as at rest); start from another shape, or divide the hose more finely"
+            )
+            warnings.warn(text, HoseWarning, stacklevel=stacklevel)
+        elif not self.is_stable:
+            text = (
+                "the equilibrium found is unstable: a real hose leaves it at the slightest touch; "
+                "start from a shape that is a little bent to find where it goes"
+            )
+            warnings.warn(text, HoseWarning, stacklevel=stacklevel)
+
+
+def warn_of_lost_moment(moment: Array, tangent: Array, place: float, stacklevel: int) -> None:
+    """Says by a `HoseWarning` what part of a point moment (3,) nothing carries, if it is one."""
+    along = abs(float(moment @ tangent))
+    if along > 1e-6 * float(np.linalg.norm(moment)):
+        text = (
+            f"a moment of {along:.3g} N m about the tangent at s = {place:g} m is lost: this hose "
+            "has no twist, or no torsional stiffness"
+        )
+        warnings.warn(text, HoseWarning, stacklevel=stacklevel)
 
 
 @dataclass(frozen=True)
@@ -154,7 +199,11 @@ class HoseModel(Protocol):
         ...
 
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
-        """Adds a point moment (3,) N m until `clear_loads`; its part along the tangent twists."""
+        """Adds a point moment (3,) N m until `clear_loads`; its part along the tangent twists.
+
+        A model without twist, or a hose without torsional stiffness, says by a `HoseWarning` that
+        this part is lost.
+        """
         ...
 
     def clear_loads(self) -> None:
@@ -169,8 +218,10 @@ class HoseModel(Protocol):
         """
         ...
 
-    def solve_static(self) -> None:
+    def solve_static(self) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads, velocity zero.
+
+        Returns whether it is stable, and whether it is folded; a `HoseWarning` says so if not.
 
         Raises:
             StepError: no equilibrium was found; the state before is kept.
@@ -191,6 +242,14 @@ class HoseModel(Protocol):
 
     def tangent(self, arc_length: ArrayLike) -> Array:
         """Unit tangent, shape (k, 3)."""
+        ...
+
+    def frame(self, arc_length: ArrayLike) -> Array:
+        """Rotation matrices (k, 3, 3) of the material: columns t, m1 and m2 = t x m1.
+
+        The directors go with the material where clamps hold it; in a model without twist they are
+        any across the tangent.
+        """
         ...
 
     def tension(self, arc_length: ArrayLike) -> Array:
@@ -226,5 +285,10 @@ class HoseModel(Protocol):
         ...
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot of this hose."""
+        """Returns to a snapshot of this hose.
+
+        Raises:
+            InputError: what is no snapshot of this hose: keys, shapes, numbers that are not finite;
+                nothing has changed then.
+        """
         ...

@@ -15,7 +15,7 @@ from hose_mj.hoses import materials
 
 POISSON_RATIO = 0.3
 """Where neither GJ nor a Poisson ratio is given, GJ = EI / (1 + this), as of a round section."""
-_MAY_BE_ZERO = {"torsional_stiffness", "damping_time", "drag"}
+_MAY_BE_ZERO = {"bending_stiffness", "torsional_stiffness", "damping_time", "drag"}
 _MAY_BE_NEGATIVE = {"rest_strain", "rest_curvature", "rest_torsion"}
 
 
@@ -57,7 +57,7 @@ class HoseSpec:
     Attributes:
         length: rest length L (m).
         axial_stiffness: EA (N).
-        bending_stiffness: EI (N m^2), about m1.
+        bending_stiffness: EI (N m^2), about m1; 0 for a chain.
         second_bending_stiffness: EI about m2 (N m^2), for ribbons and flat cables; None for a hose
             that bends alike in every direction.
         torsional_stiffness: GJ (N m^2); left out (None) that of a round section of a material with
@@ -98,7 +98,7 @@ class HoseSpec:
     def __post_init__(self, default_torsion: float | None) -> None:
         given = self.torsional_stiffness
         if given is None or (isinstance(given, float) and given == default_torsion):
-            stiffness = check_number("bending_stiffness", self.bending_stiffness)
+            stiffness = check_number("bending_stiffness", self.bending_stiffness, may_be_zero=True)
             default_torsion = stiffness / (1.0 + POISSON_RATIO)
             object.__setattr__(self, "torsional_stiffness", default_torsion)
             object.__setattr__(self, "default_torsion", default_torsion)

@@ -352,7 +352,7 @@ def catch(call):
     return message
 
 
-@pytest.mark.parametrize("name", ["length", "axial_stiffness", "bending_stiffness"])
+@pytest.mark.parametrize("name", ["length", "axial_stiffness", "linear_density"])
 @pytest.mark.parametrize("value", [-1.0, 0.0, math.nan, math.inf, "soft", None, True])
 def test_bad_material(name, value):
     message = catch(lambda: make_spec(**{name: value}))

@@ -12,19 +12,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import loops, records, twist_segments
+from hose_mj.hoses.geds import loops, records, twist_loads, twist_segments
 from hose_mj.hoses.geds.frames import transport_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
+from hose_mj.hoses.geds.twist_loads import AppliedTorque, Stretch
 from hose_mj.hoses.inputs import check_records, check_vector, read_numbers
 from hose_mj.hoses.protocol import Array, Hold, Reaction
+from hose_mj.hoses.snapshots import take, take_array, take_count, take_flag, take_list
 from hose_mj.hoses.spec import check_number
 
 _REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "accepted")
@@ -41,6 +44,7 @@ class _Held:
     position: Array  # (3,)
     tangent: Array | None  # (3,), unit
     multipliers: Array  # (d,) or (2 d - 1,), one more with theta
+    basis: Array  # N and two derivatives at its place, (3, 4)
     first: int = 0  # its first row of G x = g
 
 
@@ -55,6 +59,8 @@ class ConstraintSet:
     Attributes:
         rows: what the kernels read and write; made anew by every change.
         is_closed: whether the hose is a closed loop.
+
+    The point moments on the hose are known here for their part along the tangent alone.
     """
 
     def __init__(self, spline: Spline, hose: records.Hose, x: Array) -> None:
@@ -64,6 +70,8 @@ class ConstraintSet:
         self._compliant: list[Hold] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
         self._n_made = 0
+        self._moments: list[tuple[float, Array]] = []  # arc length, (3,) N m
+        self._shares: list[list[Stretch]] = []  # of each, where the twist carries it
         self._x = x
         self.rows = self._make_rows(twist_segments.make_twist(spline, hose, [], x))
 
@@ -88,6 +96,7 @@ class ConstraintSet:
             director: of the material where the hose begins, (3,); any by default.
         """
         self._held, self._clamps, self.is_closed = [], [], False
+        self._moments, self._shares = [], []
         twist = twist_segments.make_twist(self._spline, self._hose, [], self._x)
         if self._spline.has_theta:
             start = twist_segments.make_directors(self._spline, np.zeros(1), self._x)[0]
@@ -107,7 +116,8 @@ class ConstraintSet:
 
         Raises:
             InputError: a place off the hose or that another hold is at, a position off its plane, a
-                tangent more than 90 degrees from where the hose points.
+                tangent more than 90 degrees from where the hose points, more holds than the spline
+                has unknowns for.
         """
         spline = self._spline
         s = spline.check_place(arc_length)
@@ -127,10 +137,22 @@ class ConstraintSet:
         n_rows = spline.dimension
         if tangent is not None:
             n_rows += spline.dimension - 1 + spline.has_theta
+        in_all = len(self.rows.start) + n_rows
+        if in_all > spline.size:
+            valid = (
+                f"at most {spline.size}, the unknowns of {spline.n_control_points} control points"
+            )
+            raise InputError("number of rows of all holds", in_all, valid)
         self._n_made += 1
-        self._held.append(_Held(hold, point, tangent, np.zeros(n_rows)))
+        self._held.append(self._make_held(hold, point, tangent, np.zeros(n_rows)))
         self._rebuild()
         return hold
+
+    def _make_held(
+        self, hold: Hold, position: Array, tangent: Array | None, multipliers: Array
+    ) -> _Held:
+        values = self._spline.compute_basis(np.array([hold.arc_length]))[1][0]
+        return _Held(hold, position, tangent, multipliers, values)
 
     def move(
         self,
@@ -157,10 +179,7 @@ class ConstraintSet:
         if aim is not None and held.tangent is not None:
             _check_ahead(aim, held.tangent)
         held.position, held.tangent = point, aim
-        if tangent is None:
-            self._aim(held)
-        else:
-            self._rebuild()
+        self._aim(held, turns=tangent is not None)
         if spin != 0.0:
             self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
 
@@ -197,7 +216,7 @@ class ConstraintSet:
         now = twist_segments.transport_director(tangent, held.tangent, now)
         angle = float(np.arctan2(np.cross(now, director) @ held.tangent, now @ director))
         if self._spline.has_theta or len(self._clamps) > 1:
-            twist.spin[clamp, 0] += angle
+            twist.spin[clamp, 0] = angle
         else:
             # Nothing else knows the angle of a hose without theta.
             twist_segments.turn_director(twist, clamp, angle)
@@ -307,7 +326,93 @@ class ConstraintSet:
         twist, clamp = self.rows.twist, self._clamps.index(held.hold.number)
         torque = twist.torque[find_owners(twist)]
         arriving = float(torque[twist.ends[:, 1] == clamp].sum())
-        return arriving - float(torque[twist.ends[:, 0] == clamp].sum())
+        arriving -= float(torque[twist.ends[:, 0] == clamp].sum())
+        if len(twist.load_starts) == 0:
+            return arriving
+        place = held.hold.arc_length
+        # A moment at the clamp itself goes straight into it.
+        own = [k for k, (at, _) in enumerate(self._moments) if at == place]
+        arriving += self.tabulate_applied().measure_jump(place)
+        return arriving - float(self._measure_moments()[own].sum())
+
+    # -- moments along the tangent -------------------------------------------------------------
+
+    def set_moments(self, moments: Sequence[tuple[float, Array]]) -> None:
+        """Replaces the point moments (3,), N m, with their arc lengths; theta needs none here."""
+        self._moments = list(moments)
+        self.rows = self.rows._replace(twist=self._load(self.rows.twist))
+
+    def measure_unbalanced_torque(self) -> float:
+        """Returns the sum of the moments about the tangent (N m) where no clamp takes it up.
+
+        Zero where one does, and for what is no more than rounding.
+        """
+        moments = self.rows.twist.load_moments
+        if len(moments) == 0 or any(held.tangent is not None for held in self._held):
+            return 0.0
+        rest = float(self._measure_moments().sum())
+        return rest if abs(rest) > 1e-6 * float(np.abs(moments).sum()) else 0.0
+
+    def tabulate_applied(self) -> AppliedTorque:
+        """Returns what the point moments make of the moment about the tangent."""
+        stretches = [
+            Stretch(one.start, one.end, along * one.first, along * one.last)
+            for shares, along in zip(self._shares, self._measure_moments(), strict=True)
+            for one in shares
+        ]
+        return AppliedTorque.add_up(self._spline.length, stretches)
+
+    def find_director(self) -> tuple[float, Array]:
+        """Returns where a hose with scalar twist knows a director, and that (3,).
+
+        At its first clamp; without clamps any at s = 0.
+        """
+        twist, length = self.rows.twist, self._hose.tables.span_length
+        for clamp, number in enumerate(self._clamps):
+            if number >= 0:
+                return float(twist.places[clamp]) * length, twist.directors[clamp, 3:].copy()
+        slope = self._spline.evaluate(np.zeros(1), self._x, 1)[0]
+        unit = slope / max(float(np.linalg.norm(slope)), 1e-12)
+        return 0.0, twist_segments.compute_normal(unit)
+
+    def measure_turns(self, start: float, places: Array) -> Array:
+        """Returns the twist (k,), rad, from one arc length to others."""
+        twist, applied = self.rows.twist, self.tabulate_applied()
+        n_spans = len(self._hose.tables.first)
+        torque = (twist.angle / twist.compliance)[find_owners(twist)]
+        ends = twist.places[twist.ends] * self._hose.tables.span_length
+        turns = np.zeros(len(places))
+        for k, place in enumerate(places):
+            low, high = min(start, float(place)), max(start, float(place))
+            angle = applied.integrate(self._spline, self._hose, low, high)
+            for (first, last), moment in zip(ends, torque, strict=True):
+                if low < last and first < high:
+                    part = (self._spline, n_spans, max(low, first), min(high, last))
+                    weights = twist_segments.make_weights(*part)
+                    angle += moment * twist_segments.measure_compliance(self._hose, weights)
+            turns[k] = angle if place >= start else -angle
+        return turns
+
+    def _measure_moments(self) -> Array:
+        """The point moments' parts along the tangent that twist, (k,), N m."""
+        places = np.array([place for place, _ in self._moments[: len(self._shares)]])
+        tangents = self._spline.evaluate(places, self._x, 1)
+        tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
+        return np.asarray(np.sum(tangents * self.rows.twist.load_moments, axis=1))
+
+    def _load(self, twist: Twist) -> Twist:
+        """Returns the twist with the point moments of now on its clamps."""
+        carries = twist_segments.has_scalar_twist(self._spline, self._hose)
+        moments = self._moments if carries else []
+        self._shares = [
+            twist_loads.list_shares(self._spline, self._hose, twist, place, self.is_closed)
+            for place, _ in moments
+        ]
+        weights = [twist_loads.weigh_shares(self._spline, self._hose, one) for one in self._shares]
+        places = np.array([place for place, _ in moments])
+        vectors = np.array([vector for _, vector in moments]).reshape(-1, 3)
+        shares = np.array(weights).reshape(-1, *twist.applied.shape)
+        return twist_loads.make_loaded(self._spline, twist, places, vectors, shares)
 
     # -- state ---------------------------------------------------------------------------------
 
@@ -323,40 +428,64 @@ class ConstraintSet:
             }
             for one in self._held
         ]
-        twist = {name: getattr(self.rows.twist, name).copy() for name in _REMEMBERED}
-        before = self.rows.before.copy()
         return {
             "held": held,
             "n_made": self._n_made,
             "is_closed": self.is_closed,
-            "before": before,
-            "twist": twist,
+            "before": self.rows.before.copy(),
+            "after": self.rows.after.copy(),
+            "twist": {name: getattr(self.rows.twist, name).copy() for name in _REMEMBERED},
             "compliant": [hold.number for hold in self._compliant],
             "mean_force": self.rows.response.force.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot."""
-        self._held = [
-            _Held(
-                Hold(one["number"], one["arc_length"], one["tangent"] is not None),
-                one["position"].copy(),
-                None if one["tangent"] is None else one["tangent"].copy(),
-                one["multipliers"].copy(),
-            )
-            for one in state["held"]
-        ]
-        self._n_made = max(self._n_made, state["n_made"])
-        self.is_closed = state["is_closed"]
+        """Returns to a snapshot; raises `InputError` for one of another hose, half restored."""
+        held = [self._read_held(one) for one in take_list(state, "held")]
+        is_closed = take_flag(state, "is_closed")
+        self._check_apart(held, is_closed)
+        was_closed, self.is_closed = self.is_closed, is_closed
+        if was_closed != self.is_closed or _list_clamps(held) != _list_clamps(self._held):
+            # Other clamps may have the same numbers: nothing goes on from those of now.
+            self._held, self._clamps, self._moments, self._shares = [], [], [], []
+            twist = twist_segments.make_twist(self._spline, self._hose, [], self._x)
+            self.rows = self._make_rows(twist)
+        self._held = held
+        self._n_made = max(self._n_made, take_count(state, "n_made"))
         self._rebuild()
-        self.rows.before[:] = state["before"]
+        rows, twist = self.rows, take(state, "twist")
+        for name in ("before", "after"):
+            getattr(rows, name)[:] = take_array(state, name, getattr(rows, name).shape)
         for name in _REMEMBERED:
-            getattr(self.rows.twist, name)[:] = state["twist"][name]
-        self.rows.twist.frames[:] = self.rows.twist.accepted
-        if state["compliant"]:
+            part = getattr(rows.twist, name)
+            part[:] = take_array(twist, name, part.shape)
+        rows.twist.frames[:] = rows.twist.accepted
+        compliant, forces = take_list(state, "compliant"), take_array(state, "mean_force", (None,))
+        if compliant:
             numbers = {one.hold.number: one.hold for one in self._held}
-            self.set_compliance([numbers[number] for number in state["compliant"]])
-            self.rows.response.force[:] = state["mean_force"]
+            self.set_compliance([numbers[number] for number in compliant])
+            self.rows.response.force[:] = forces
+
+    def _check_apart(self, held: Sequence[_Held], is_closed: bool) -> None:
+        """Raises `InputError` for holds of a snapshot that no hose can have together."""
+        places = sorted(one.hold.arc_length for one in held)
+        if is_closed and places:
+            places.append(places[0] + self._spline.length)
+        if is_closed and self._spline.has_theta:
+            raise InputError("is_closed of a snapshot", is_closed, "False for a hose with theta")
+        if np.any(np.diff(places) < 1e-9 * self._spline.length):
+            raise InputError("arc lengths of the holds of a snapshot", places, "places apart")
+
+    def _read_held(self, one: Any) -> _Held:
+        """Returns a hold from its entry of a snapshot."""
+        place = float(take_array(one, "arc_length", ()))
+        is_clamp = take(one, "tangent") is not None
+        tangent = take_array(one, "tangent", (3,)) if is_clamp else None
+        d = self._spline.dimension
+        n_rows = d + is_clamp * (d - 1 + self._spline.has_theta)
+        hold = Hold(take_count(one, "number"), self._spline.check_place(place), is_clamp)
+        position = self._spline.check_position(take_array(one, "position", (3,)))
+        return self._make_held(hold, position, tangent, take_array(one, "multipliers", (n_rows,)))
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -397,13 +526,18 @@ class ConstraintSet:
             n_spans = len(self._hose.tables.first)
             twist_segments.take_over_frames(twist, self.rows.twist, same, n_spans)
         else:
-            old = twist_segments.part_ends(self._spline, self._hose, self.rows.twist, self._x)
-            twist_segments.take_over_twist(self._spline, self._hose, twist, old, same, self._x)
+            applied = self.tabulate_applied()
+            measure = partial(applied.integrate, self._spline, self._hose)
+            twist_now = self.rows.twist
+            old = twist_segments.part_ends(self._spline, self._hose, twist_now, self._x, measure)
+            twist_segments.take_over_twist(
+                self._spline, self._hose, twist, old, same, self._x, measure
+            )
             if self.is_closed:
                 twist = twist_segments.join_ends(twist, spin)
             twist_segments.settle(twist)
         self._clamps = numbers
-        self.rows = self._make_rows(twist)
+        self.rows = self._make_rows(self._load(twist))
 
     def _make_rows(self, twist: Twist) -> records.Constraints:
         """Makes the rows of G x = g: positions first, then slopes across, then theta.
@@ -419,10 +553,10 @@ class ConstraintSet:
         first = 0
         for held in self._held:
             own = slice(first, first + len(held.multipliers))
-            places, values = self._spline.compute_basis(np.array([held.hold.arc_length]))
-            start[own] = places[0]
-            coefficients[own, :width] = self._make_own_rows(held, values[0])
-            before[own] = coefficients[own, :width] @ self._x[places[0] : places[0] + width]
+            place = self._spline.compute_basis(np.array([held.hold.arc_length]))[0][0]
+            start[own] = place
+            coefficients[own, :width] = self._make_own_rows(held)
+            before[own] = coefficients[own, :width] @ self._x[place : place + width]
             after[first : first + d] = (held.position - self._spline.offset)[self._spline.dims]
             if held.tangent is not None and self._spline.has_theta:
                 after[own.stop - 1] = before[own.stop - 1]
@@ -439,18 +573,22 @@ class ConstraintSet:
         response = records.make_response(0)
         return records.Constraints(start, coefficients, before, after, multipliers, twist, response)
 
-    def _aim(self, held: _Held) -> None:
-        """What `_rebuild` does for a hold of which only the position has changed."""
+    def _aim(self, held: _Held, turns: bool) -> None:
+        """What `_rebuild` does for a hold with another position or, if it turns, tangent."""
         d, rows = self._spline.dimension, self.rows
         own = slice(held.first, held.first + len(held.multipliers))
         start, width = rows.start[held.first], 4 * self._spline.n_dof
+        if turns:
+            rows.rows[own, :width] = self._make_own_rows(held)
         rows.before[own] = rows.rows[own, :width] @ self._x[start : start + width]
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
+        if turns and self._spline.has_theta:
+            rows.after[own.stop - 1] = rows.before[own.stop - 1]
 
-    def _make_own_rows(self, held: _Held, values: Array) -> Array:
-        """Coefficients of one hold's rows from the basis there (3, 4)."""
-        d, n_dof = self._spline.dimension, self._spline.n_dof
+    def _make_own_rows(self, held: _Held) -> Array:
+        """Coefficients of one hold's rows."""
+        d, n_dof, values = self._spline.dimension, self._spline.n_dof, held.basis
         rows = np.zeros((len(held.multipliers), 4, n_dof))
         for c in range(d):
             rows[c, :, c] = values[0]
@@ -460,6 +598,10 @@ class ConstraintSet:
             if self._spline.has_theta:
                 rows[-1, :, 3] = values[0]
         return rows.reshape(len(rows), 4 * n_dof)
+
+
+def _list_clamps(held: Sequence[_Held]) -> list[Hold]:
+    return [one.hold for one in held if one.tangent is not None]
 
 
 def _check_ahead(aim: Array, now: Array) -> None:

@@ -18,6 +18,7 @@ from hose_mj.hoses.geds import (
     packing,
     point_masses,
     records,
+    stability,
     stepping,
 )
 from hose_mj.hoses.geds.constraints import ConstraintSet
@@ -44,6 +45,15 @@ _RESET_ITERATIONS = 8
 much of the hose's own turns the iteration crawls."""
 _NO_MASSES = point_masses.make_none()
 _NO_ROWS = np.zeros(0, dtype=np.int64)
+
+
+_ROUNDING = 1e-12
+"""Of the largest stiffness over mass (1/s^2): what is below is no sign of anything."""
+_SLOW = 1e-2
+"""Of EI / (rho L^4): the square of a rate below which growth counts as none (1/s^2); the slowest
+bending motion of a clamped hose is 35 times as fast."""
+_AIDS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+"""Bending stiffness lent to a chain in statics, in loads times length squared."""
 
 
 @dataclass
@@ -131,9 +141,6 @@ class Dynamics:
             StepError: no equilibrium was found; the state before is kept.
         """
         rows, work = self.constraints.rows, self.make_work()
-        length = self.hose.tables.span_length * len(self.hose.tables.first)
-        tolerance = _STATIC_TOLERANCE * length
-        limits = records.Limits(tolerance, length, _STATIC_ITERATIONS, _STATIC_TURN, False, 1.0, np.inf)
         verdict, found = records.NOT_CONVERGED, self.state.x
         changing = (rows.twist.accepted, rows.twist.spin, rows.before, rows.after)
         before = [part.copy() for part in changing]
@@ -141,8 +148,8 @@ class Dynamics:
             _copy(before, changing)
             integrators.start_step(self.axes, rows, np.inf)
             found = self.state.x.copy()
-            for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
-                verdict, found = self._iterate(scale, limits, found, work)
+            for hose, scale in self._list_stages(load_steps):
+                verdict, found = self._iterate(hose, scale, found, work)
                 if verdict != records.DONE:
                     break
             load_steps *= 2
@@ -160,20 +167,62 @@ class Dynamics:
         elif len(self.axes) == 4:
             self._accept_frames(self.state, work)
 
+    def _list_stages(self, load_steps: int) -> list[tuple[records.Hose, float]]:
+        """Hoses and shares of their loads through which a static solve goes, its own last.
+
+        A chain (EI = 0) that is not drawn taut resists no load across it. It goes by way of hoses
+        with less and less bending stiffness.
+        """
+        hose = self.hose
+        scales = [float(scale) for scale in np.linspace(0.0, 1.0, load_steps + 1)[1:]]
+        if np.any(hose.elasticity.bending_stiffness > 0.0):
+            return [(hose, scale) for scale in scales]
+        length = hose.tables.span_length * len(hose.tables.first)
+        load = float(np.abs(self.loads.loads.force).sum())
+        load = load or 1e-6 * float(hose.elasticity.axial_stiffness.min())
+        aids = [self._stiffen(aid * load * length**2) for aid in _AIDS]
+        return [(aids[0], scale) for scale in scales] + [(one, 1.0) for one in [*aids[1:], hose]]
+
+    def _stiffen(self, bending_stiffness: float) -> records.Hose:
+        """Returns this hose with a bending stiffness of its own (N m^2)."""
+        elasticity = self.hose.elasticity
+        stiffness = np.full_like(elasticity.bending_stiffness, bending_stiffness)
+        stiff = elasticity._replace(bending_stiffness=stiffness, second_stiffness=stiffness)
+        return self.hose._replace(elasticity=stiff)
+
+    def check_stability(self) -> bool:
+        """Returns whether the present state, an equilibrium, is stable; changes nothing."""
+        twist = self.constraints.rows.twist
+        torque = twist.torque.copy()
+        work = self.build_tangent()
+        length = self.hose.tables.span_length * len(self.hose.tables.first)
+        mass = float(np.mean(self.hose.mass[:, 0]))
+        density = float(2.0 * self.hose.mass.sum() - self.hose.mass[:, 0].sum()) / length
+        bending = float(self.hose.elasticity.bending_stiffness.max()) / (density * length**4)
+        stiffest = float(np.abs(work.band[: len(self.state.x), 0]).max()) / mass
+        least_rate = max(_ROUNDING * stiffest, _SLOW * bending)
+        rows = self.constraints.rows
+        found = stability.is_positive(self.axes, self.hose, rows, least_rate, work)
+        twist.torque[:] = torque
+        return bool(found)
+
     def _iterate(
-        self, scale: float, limits: records.Limits, x: Array, work: records.Work
+        self, hose: records.Hose, scale: float, x: Array, work: records.Work
     ) -> tuple[int, Array]:
         """Newton's iteration at one load; a hose with theta resets its frames now and then."""
         stage = (np.inf, x.copy(), np.zeros_like(x))
         state = integrators.make_state(len(x))
         state.x[:] = x
         has_theta = len(self.axes) == 4
-        if has_theta:
-            limits = limits._replace(max_iterations=_RESET_ITERATIONS)
+        length = self.hose.tables.span_length * len(self.hose.tables.first)
+        most = _RESET_ITERATIONS if has_theta else _STATIC_ITERATIONS
+        limits = records.Limits(
+            _STATIC_TOLERANCE * length, length, most, _STATIC_TURN, False, 1.0, np.inf
+        )
         rows, verdict = self.constraints.rows, records.NOT_CONVERGED
         for _ in range(_STATIC_ITERATIONS // _RESET_ITERATIONS):
             verdict, more, fell = newton.newton(
-                *(self.axes, self.hose, stage, rows, 1.0, self.loads.loads),
+                *(self.axes, hose, stage, rows, 1.0, self.loads.loads),
                 *(scale, limits, state.x, work),
             )
             self.counts[ITERATIONS] += more

@@ -14,30 +14,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import InputError
+from hose_mj.errors import HoseWarning, InputError
 from hose_mj.hoses.geds import integrators, mechanics, records
-from hose_mj.hoses.geds.body import SplineBody
+from hose_mj.hoses.geds.body import FOLDED, SplineBody
 from hose_mj.hoses.geds.body_coupling import BodyCoupling
 from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
+from hose_mj.hoses.geds.material_frames import check_rotation
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.inputs import (
-    check_count,
-    check_records,
-    check_rows,
-    check_vector,
-    restore_snapshot,
-)
+from hose_mj.hoses.inputs import check_count, check_records, check_rows, check_vector
+from hose_mj.hoses.laying import LARGEST_LAID_STRAIN
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
-from hose_mj.hoses.protocol import Array, Curve, Hold, Linearization, Reaction
+from hose_mj.hoses.protocol import (
+    Array,
+    Curve,
+    Equilibrium,
+    Hold,
+    Linearization,
+    Reaction,
+    warn_of_lost_moment,
+)
+from hose_mj.hoses.snapshots import take, take_array, take_count, undo
 from hose_mj.hoses.spec import HoseSpec, check_number, check_spec
 
 _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
-
-
 _MOVED = {
     "obstacles": "contacts.obstacles",
     "contact_arc_lengths": "contacts.arc_lengths",
@@ -154,8 +157,9 @@ class GedsHose(SplineBody):
     ) -> None:
         """Puts the hose along a curve (thesis A.3), at rest or moving; drops holds and loads.
 
-        The material is free of torque, but for twist="frenet" (docs/frenet.md). A closed loop
-        is open again.
+        The curve is followed at an even pace, whatever its own: the strain is the same all along,
+        and a `HoseWarning` says so where it is above 1 %. The material is free of torque, but for
+        twist="frenet" (docs/frenet.md). A closed loop is open again.
 
         Args:
             curve: points (k, 3) m, or a function of arc lengths (k,) that returns them.
@@ -171,6 +175,16 @@ class GedsHose(SplineBody):
         start = None if director is None else check_vector("director", director)
         self._set_shape(curve, velocity)
         self._start(start)
+        strains = self._measure_strains()[:, 0]
+        largest = float(strains[np.argmax(np.abs(strains))])
+        if abs(largest) > LARGEST_LAID_STRAIN:
+            force = abs(largest) * self.spec.axial_stiffness
+            warnings.warn(
+                f"the hose is laid with a strain of {largest:.2%}, {force:.3g} N of force; lay it "
+                f"along a curve of its length, {self.spec.length:g} m, without corners",
+                HoseWarning,
+                stacklevel=2,
+            )
 
     def set_control_points(self, points: ArrayLike) -> None:
         """Puts the control points at (n, 3) m, at rest, however odd; drops holds and loads.
@@ -201,22 +215,35 @@ class GedsHose(SplineBody):
         """Returns to a snapshot of this hose, or of one with as many control points and unknowns.
 
         Raises:
-            InputError: a snapshot of a hose with another number of unknowns, or what is none.
-                Nothing changed then.
+            InputError: what is no snapshot, or one of a hose with another number of unknowns;
+                nothing has changed then.
         """
-        restore_snapshot(state, self.snapshot(), self._restore)
+        before = self.snapshot()
+        with undo(lambda: self._restore(before)):
+            self._restore(state)
 
     def _restore(self, state: dict[str, Any]) -> None:
-        size = len(state["state"]["x"])
+        parts = take(state, "state")
+        size = len(take_array(parts, "x", (None,)))
         if size != self._spline.size:
             valid = f"{self._spline.size}, as in this hose"
             raise InputError("number of unknowns in the snapshot", size, valid)
-        self._set_state(integrators.State(**state["state"]))
-        self._spline.offset = state["offset"].copy()
-        self._counts[:] = state["steps"], state["iterations"], state["fallbacks"]
-        self._loads.restore(state["loads"])
-        self._constraints.restore(state["holds"])
-        self.contacts.restore(state["contacts"])
+        shapes = {name: part.shape for name, part in self._state._asdict().items()}
+        read = {name: take_array(parts, name, shape) for name, shape in shapes.items()}
+        offset = take_array(state, "offset", (3,))
+        counts = [take_count(state, name) for name in ("steps", "iterations", "fallbacks")]
+        self._set_state(integrators.State(**read))
+        self._spline.offset = offset
+        self._counts[:] = counts
+        self._loads.restore(take(state, "loads"))
+        self._constraints.restore(take(state, "holds"))
+        self._constraints.set_moments(self._loads.list_moments())
+        contacts = take(state, "contacts")
+        for name, part in self.contacts.snapshot().items():
+            if isinstance(part, np.ndarray):
+                rows = take_array(contacts, name, (None, *part.shape[1:]), is_finite=False)
+                contacts = contacts | {name: rows}
+        self.contacts.restore(contacts)
         self.contacts.set_closed(self.is_closed)
 
     # -- holds and loads ---------------------------------------------------------------------------
@@ -253,15 +280,31 @@ class GedsHose(SplineBody):
         position: ArrayLike | None = None,
         tangent: ArrayLike | None = None,
         spin: float = 0.0,
+        frame: ArrayLike | None = None,
     ) -> None:
         """Sets where a hold is to be at the end of the next step: position (3,) m, tangent (3,).
 
         A clamp's material goes along by the smallest rotation to the new tangent and is turned by
-        `spin` (rad, right-handed about the tangent, any number of turns) on top. Raises
-        `InputError` for a hold that was released, a tangent or a spin for an attachment, vectors
-        out of a planar hose's plane.
+        `spin` (rad, right-handed about the tangent, any number of turns) on top. A `frame` says all
+        of that at once: a rotation matrix (3, 3) as `frame` gives it, to which the material turns
+        by less than half a turn. Raises `InputError` for a hold that was released, a tangent, a
+        spin or a frame for an attachment, vectors out of a planar hose's plane, a frame that is no
+        rotation or comes with a tangent or a spin.
         """
-        self._constraints.move(hold, position, tangent, spin)
+        if frame is None:
+            self._constraints.move(hold, position, tangent, spin)
+            return
+        axes = check_rotation("frame", frame)
+        if tangent is not None or spin != 0.0:
+            raise InputError.about(
+                "a clamp moved by a frame takes no tangent and no spin beside it"
+            )
+        if self._spline.dimension == 2:
+            self._constraints.move(hold, position, axes[:, 0], 0.0)
+            return
+        across = self._constraints.check_director(axes[:, 1], axes[:, 0])
+        self._constraints.move(hold, position, axes[:, 0], 0.0)
+        self._constraints.turn_to(hold, across)
 
     @property
     def holds(self) -> list[Hold]:
@@ -311,8 +354,15 @@ class GedsHose(SplineBody):
         self._loads.add_force(arc_length, force)
 
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
-        """Adds a point moment (3,) N m until `clear_loads`; what lies along the tangent is lost."""
+        """Adds a point moment (3,) N m until `clear_loads`; its part along the tangent twists.
+
+        A hose without torsional stiffness carries no such part, and says so (`HoseWarning`).
+        """
         self._loads.add_moment(arc_length, moment)
+        self._constraints.set_moments(self._loads.list_moments())
+        if self.spec.torsional_stiffness == 0.0 and self._spline.dimension == 3:
+            place, vector = self._loads.list_moments()[-1]
+            warn_of_lost_moment(vector, self.tangent(place)[0], place, stacklevel=3)
 
     def set_push(self, arc_lengths: ArrayLike, forces: ArrayLike) -> None:
         """Replaces the forces (k, 3), N, by which a neighbour pushes at arc lengths (k,), m.
@@ -328,6 +378,7 @@ class GedsHose(SplineBody):
     def clear_loads(self) -> None:
         """Drops all point forces and moments; gravity stays."""
         self._loads.clear()
+        self._constraints.set_moments([])
 
     # -- motion ------------------------------------------------------------------------------------
 
@@ -339,12 +390,17 @@ class GedsHose(SplineBody):
             StepError: a step that no fallback finished; the last step that worked is kept.
         """
         if check_count("n_steps", n_steps, 0) > 0:
+            self._warn_of_spin()
             self._dynamics.advance(int(n_steps))
 
-    def solve_static(self, load_steps: int = 1) -> None:
+    def solve_static(self, load_steps: int = 1) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.
 
         The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
+        An equilibrium that is unstable or folded is said by a `HoseWarning` too. It counts as
+        unstable where a disturbance grows faster than some hundredth of the slowest bending motion.
+        A moment that acts in space has no energy: the symmetric part of the stiffness decides then,
+        which may err, and no warning is given.
 
         Raises:
             InputError: load_steps is not a whole number from 1 to 64; a closed loop that nothing
@@ -355,8 +411,14 @@ class GedsHose(SplineBody):
         if self.is_closed and self._constraints.is_free:
             valid = "a clamp, or attachments: a loop that nothing holds is at rest anywhere"
             raise InputError("holds of a closed loop", "none", valid)
+        self._warn_of_spin()
         self._dynamics.solve_static(int(load_steps))
         self.contacts.forget()
+        least = self.measure_least_stretch()
+        found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
+        if found.is_folded or self._spline.dimension == 2 or not self._loads.list_moments():
+            found.warn(stacklevel=3)
+        return found
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and constraint rows in the control points' n d coordinates."""
@@ -396,6 +458,18 @@ class GedsHose(SplineBody):
                 f"GedsHose.{name} is now GedsHose.{moved}", DeprecationWarning, stacklevel=2
             )
             return operator.attrgetter(moved)(self)
+
+    def _warn_of_spin(self) -> None:
+        """Says that moments about the tangent have nothing that would balance them, if so."""
+        rest = self._constraints.measure_unbalanced_torque()
+        if rest != 0.0:
+            warnings.warn(
+                f"nothing holds the hose against turning about its axis by {rest:.3g} N m: it "
+                "would spin ever faster, which the scalar twist does not show; clamp it, or make "
+                'it with twist="theta"',
+                HoseWarning,
+                stacklevel=3,
+            )
 
     def _start(self, director: Array | None = None) -> None:
         self._counts[STEPS] = 0

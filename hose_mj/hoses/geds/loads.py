@@ -12,6 +12,7 @@ from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_arc_lengths, check_rows, check_vector
 from hose_mj.hoses.protocol import Array
+from hose_mj.hoses.snapshots import take_array, take_list
 
 
 class LoadSet:
@@ -69,7 +70,10 @@ class LoadSet:
         self._rebuild()
 
     def add_moment(self, arc_length: float, moment: ArrayLike) -> None:
-        """Adds a point moment (3,) N m, world frame; what lies along the tangent is lost.
+        """Adds a point moment (3,) N m, world frame.
+
+        What lies along the tangent acts on theta where there is one; in the scalar form of twist
+        `ConstraintSet.set_moments` sees to it.
 
         Raises:
             InputError: a place off the hose, a vector that is not finite, or one that would turn a
@@ -81,6 +85,10 @@ class LoadSet:
         self._moments.append((place, vector))
         self._rebuild()
 
+    def list_moments(self) -> list[tuple[float, Array]]:
+        """Returns all point moments (3,), N m, with the arc length of each."""
+        return list(self._moments)
+
     def snapshot(self) -> dict[str, Any]:
         """All point forces and moments as (arc length, vector) pairs."""
         return {
@@ -90,11 +98,18 @@ class LoadSet:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot."""
-        self._forces = [(place, vector.copy()) for place, vector in state["forces"]]
-        self._moments = [(place, vector.copy()) for place, vector in state["moments"]]
-        self._push = state["push"].copy()
+        """Returns to a snapshot; raises `InputError` for what is none."""
+        self._forces = self._read_loads(state, "forces")
+        self._moments = self._read_loads(state, "moments")
+        self._push = take_array(state, "push", self._weight.shape)
         self._rebuild()
+
+    def _read_loads(self, state: dict[str, Any], key: str) -> list[tuple[float, Array]]:
+        loads = []
+        for place, vector in take_list(state, key):
+            at = self._spline.check_place(place)
+            loads.append((at, check_vector(key, vector).copy()))
+        return loads
 
     def _rebuild(self) -> None:
         d, n_dof = self._spline.dimension, self._spline.n_dof

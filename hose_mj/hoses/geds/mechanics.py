@@ -28,6 +28,10 @@ def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
         not isinstance(form, str) or form not in ("scalar", "theta", "frenet")
     ):
         raise InputError("twist", form, "None, scalar, theta, frenet")
+    stiffened = any(fitting.bending_stiffness is not None for fitting in spec.fittings)
+    if spec.bending_stiffness == 0.0 and (stiffened or not spec.is_isotropic):
+        valid = "above 0 for a hose with a rest curvature, a second stiffness or a fitting's"
+        raise InputError("bending_stiffness", 0.0, valid)
     if plane is not None:
         if form is not None:
             raise InputError("twist", form, "None for a hose in a plane")
@@ -64,7 +68,7 @@ def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> record
     elasticity = Elasticity(
         average_stiffness(spec, "axial_stiffness", spans),
         bending,
-        bending * (second / spec.bending_stiffness),
+        bending * (second / spec.bending_stiffness if spec.bending_stiffness > 0.0 else 1.0),
         average_stiffness(spec, "torsional_stiffness", cells),
         np.full(n_spans, spec.rest_strain, dtype=np.float64),
         np.full((n_spans, 3), spec.rest_curvature, dtype=np.float64),
@@ -100,6 +104,15 @@ def average_stiffness(spec: HoseSpec, name: str, cells: Array) -> Array:
 def average_density(spec: HoseSpec, cells: Array) -> Array:
     """Returns the mean mass per length of cells (..., 2), kg/m."""
     return _average(spec, "linear_density", cells, lambda value: value)
+
+
+def list_mass_points(spec: HoseSpec, n_spans: int) -> tuple[Array, Array]:
+    """Returns arc lengths (k,), m, and masses (k,), kg, of the Gauss points of the mass matrix."""
+    nodes = np.polynomial.legendre.leggauss(len(basis.MASS_WEIGHTS))[0]
+    length = spec.length / n_spans
+    places = (np.arange(n_spans)[:, None] + 0.5 + 0.5 * nodes) * length
+    density = average_density(spec, make_cells(basis.MASS_WEIGHTS, n_spans, spec.length))
+    return places.ravel(), (density * basis.MASS_WEIGHTS * length).ravel()
 
 
 def _average(spec: HoseSpec, name: str, cells: Array, convert: Callable[[float], float]) -> Array:

@@ -235,7 +235,8 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
                 factor = limits.rotation_cap / turn
         _move(twist, factor, x, work)
         if factor == 1.0 and largest <= limits.tolerance:
-            wanted = limits.force_tolerance * _measure_scale(hose, stage, constraints, loads, x, work)
+            wanted = _measure_scale(hose, stage, constraints, loads, x, work)
+            wanted *= limits.force_tolerance
             left = _measure_strain_left(axes, hose, work.step)
             if left <= wanted and loads.contact.found[TOUCHED] > 0.0:
                 left += _measure_contact_left(axes, stage, fraction, loads.contact, x, work)
@@ -273,7 +274,7 @@ def _measure_scale(hose, stage, constraints, loads, x, work):
 
 @inlined
 def _measure_strain_left(axes, hose, step):
-    """The largest axial force (N) that a Newton step leaves: EA times its strain of second order."""
+    """The largest axial force (N) that a step leaves: EA times its strain of second order."""
     d, tables = len(axes), hose.tables
     largest = 0.0
     for e in range(tables.first.shape[0]):

@@ -24,6 +24,9 @@ from numba.extending import (
 from hose_mj.jit import compiled
 
 
+_intrinsic: Any = intrinsic
+
+
 class Address(types.Type):
     """numba's type of the address of a packed record."""
 
@@ -57,7 +60,7 @@ def _disown(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-@intrinsic
+@_intrinsic
 def _measure(typing: Any, record: Any) -> Any:
     """Bytes that a record takes."""
 
@@ -69,7 +72,7 @@ def _measure(typing: Any, record: Any) -> Any:
     return types.int64(record), generate
 
 
-@intrinsic
+@_intrinsic
 def _store(typing: Any, record: Any, address: Any) -> Any:
     """Writes a record to an address."""
 
@@ -82,7 +85,7 @@ def _store(typing: Any, record: Any, address: Any) -> Any:
     return types.void(record, types.int64), generate
 
 
-@intrinsic
+@_intrinsic
 def unpack(typing: Any, address: Any) -> Any:
     """The record at an address."""
     record = address.record
@@ -112,7 +115,7 @@ class Packed:
 
     def __init__(self, record: Any) -> None:
         self._record = record  # keeps its arrays alive
-        self.kind = Address(typeof(record))
+        self.kind = Address(typeof(record))  # type: ignore[no-untyped-call]
         self._room = np.zeros(_pack(record, 0) // 8 + 1, dtype=np.int64)
         self.address = self._room.ctypes.data
         _pack(record, self.address)

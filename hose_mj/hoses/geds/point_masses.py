@@ -59,10 +59,11 @@ class PointMasses(NamedTuple):
 
 def make_none() -> PointMasses:
     """Returns no masses at all."""
-    rows = [np.zeros((0, 3)) for _ in range(5)]
-    walls, arm, push = np.zeros((0, ROW)), np.zeros((0, 3)), np.zeros((0, 3))
-    owner = np.zeros(0, dtype=np.int64)
-    return PointMasses(*rows, np.zeros(0), 3, np.zeros(0), walls, owner, arm, push)
+    rows = np.zeros((0, 3))
+    walls, owner = np.zeros((0, ROW)), np.zeros(0, dtype=np.int64)
+    return PointMasses(
+        *(rows, rows, rows, rows, rows, np.zeros(0), 3, np.zeros(0), walls, owner, rows, rows)
+    )
 
 
 @kernel

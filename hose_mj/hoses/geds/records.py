@@ -143,7 +143,9 @@ class Work(NamedTuple):
     """Work arrays of one hose and the multipliers of its constraints.
 
     x, X and V are a stage, x_now and v_now a step in the making, flat (n d,): nothing reaches the
-    state before the step is done; start is where it began.
+    state before the step is done; start is where it began. Where rows are counted, `schur`,
+    `multipliers` and `shift` have as many as there are, and `lower` one more: holds may ask for
+    more rows than there are unknowns.
     """
 
     span: Span
@@ -182,7 +184,7 @@ def make_work(n_control_points, n_dof, n_rows):
         np.zeros((n_rows + 1, padded)),
         np.zeros((n_rows, n_rows)),
         np.zeros(n_rows),
-        np.zeros(padded),
+        np.zeros(n_rows),
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),

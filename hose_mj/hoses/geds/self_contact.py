@@ -172,7 +172,7 @@ def _push_apart(axes, contact, pair, rate, step, gradient, band):
 
 @kernel
 def _scatter(axes, points, q, start, force, stiffness, gradient, band):
-    """Adds a force at contact point q and its stiffness, factor and rows, to the span's unknowns."""
+    """Adds a force at contact point q and its stiffness, a factor and rows, to the unknowns."""
     d = len(axes)
     n_coordinates = len(axes[:3])
     factor, rows = stiffness

@@ -19,6 +19,11 @@ A closed loop has two more clamps, which hold nothing: at s = 0 and at s = L, wh
 been joined. They cut it into pieces, each as between two clamps of an open hose. Where there are
 other clamps, the first piece and the last are one segment with one moment, and only the sum of
 their angles counts.
+
+A point moment m has a part m . t along the tangent. The moment that the hose carries drops by it
+there; to the moment Phi / c of the segment, which is the mean, it adds a share that twist_loads.py
+knows in advance, since nothing but the places of clamps and moments goes into it. It acts on the
+shape like any moment of twist.
 """
 
 from __future__ import annotations
@@ -65,6 +70,13 @@ class Twist(NamedTuple):
             new directors (3 S,), a band (n + 4, 8) and its right-hand side (1, n + 4).
         transported: work: the tangent u, the director and the sum of item 2, (pieces, 7).
         rows: derivative of Phi by the unknowns, (K, size + padding).
+        load_starts: index of the first of the unknowns that shape the hose at each of k point
+            moments, (k,).
+        load_slopes: dN/ds there, (k, 4).
+        load_moments: (k, 3), N m, world frame.
+        load_shares: moment about the tangent that one newton metre along it makes at each Gauss
+            point, times the length that the point stands for, (k, S, 3), m.
+        applied: work: what all point moments make there, (S, 3), N m^2; of no use where k is 0.
     """
 
     starts: np.ndarray
@@ -88,6 +100,11 @@ class Twist(NamedTuple):
     turn_rows: np.ndarray
     transported: Array
     rows: Array
+    load_starts: np.ndarray
+    load_slopes: Array
+    load_moments: Array
+    load_shares: Array
+    applied: Array
 
 
 def find_owners(twist: Twist) -> np.ndarray:
@@ -146,6 +163,72 @@ def open_segments(axes, twist, x):
     for k in range(len(twist.angle)):
         for i in range(twist.rows.shape[1]):
             twist.rows[k, i] = 0.0
+    if len(twist.load_starts) > 0:
+        _spread_loads(axes, twist, x)
+
+
+@kernel
+def _spread_loads(axes, twist, x):
+    """Writes to twist.applied what the point moments' parts along the tangent make."""
+    for e in range(twist.applied.shape[0]):
+        for g in range(3):
+            twist.applied[e, g] = 0.0
+    for k in range(len(twist.load_starts)):
+        t0, t1, t2 = compute_tangent(axes, twist.load_starts[k], twist.load_slopes, k, x)
+        moment = twist.load_moments
+        along = moment[k, 0] * t0 + moment[k, 1] * t1 + moment[k, 2] * t2
+        for e in range(twist.applied.shape[0]):
+            for g in range(3):
+                twist.applied[e, g] += along * twist.load_shares[k, e, g]
+
+
+@inlined
+def _measure_bend(g, p):
+    """Returns kb, the tangent t, 1 / A and 1 / |a| at Gauss point g."""
+    a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
+    b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
+    inverse = 1.0 / max(a0 * a0 + a1 * a1 + a2 * a2, LEAST_A)
+    root = np.sqrt(inverse)
+    k0 = (a1 * b2 - a2 * b1) * inverse
+    k1 = (a2 * b0 - a0 * b2) * inverse
+    k2 = (a0 * b1 - a1 * b0) * inverse
+    return (k0, k1, k2), (a0 * root, a1 * root, a2 * root), inverse, root
+
+
+@inlined
+def _add_stiffness(g, moment, bend, tangent, inverse, p):
+    """Adds the geometric stiffness of a moment times a length (N m^2) at Gauss point g.
+
+    By (a, a): -3/2 (t kb^T + kb t^T) / A; by (a, b): [t]x / (2 A).
+    """
+    k0, k1, k2 = bend
+    t0, t1, t2 = tangent
+    aa = -1.5 * moment * inverse
+    ab = 0.5 * moment * inverse
+    q = p.stiffness
+    q[0, 0, g] += 2.0 * aa * t0 * k0
+    q[1, 0, g] += aa * (t1 * k0 + k1 * t0)
+    q[1, 1, g] += 2.0 * aa * t1 * k1
+    q[2, 0, g] += aa * (t2 * k0 + k2 * t0)
+    q[2, 1, g] += aa * (t2 * k1 + k2 * t1)
+    q[2, 2, g] += 2.0 * aa * t2 * k2
+    q[1, 0, 3 + g] += ab * t2
+    q[2, 0, 3 + g] -= ab * t1
+    q[2, 1, 3 + g] += ab * t0
+    q[1, 0, 6 + g] -= ab * t2
+    q[2, 0, 6 + g] += ab * t1
+    q[2, 1, 6 + g] -= ab * t0
+
+
+@kernel
+def _add_applied(twist, e, exact, p):
+    """Adds force and geometric stiffness of what the point moments make in span e."""
+    for g in range(3):
+        moment = twist.applied[e, g]
+        bend, tangent, inverse, root = _measure_bend(g, p)
+        for c in range(3):
+            p.force[g, 0, c] += moment * root * bend[c]
+        _add_stiffness(g, exact * moment, bend, tangent, inverse, p)
 
 
 @inlined
@@ -153,8 +236,11 @@ def add_twist(axes, tables, twist, e, exact, x, p):
     """Carries the directors through span e and adds what twist does there.
 
     The derivative of Phi goes to twist.rows, the moment's geometric stiffness (scaled by `exact`,
-    with the moment of the last iterate) to p.stiffness; the force follows in `close_segments`.
+    with the moment of the last iterate) to p.stiffness; the force follows in `close_segments`. What
+    point moments make is known already.
     """
+    if len(twist.load_starts) > 0:
+        _add_applied(twist, e, exact, p)
     for k in range(len(twist.ends)):
         if e < twist.spans[k, 0] or e > twist.spans[k, 1]:
             continue
@@ -164,15 +250,9 @@ def add_twist(axes, tables, twist, e, exact, x, p):
         total = 0.0
         for g in range(3):
             weight = twist.weights[k, e, g]
-            a0, a1, a2 = p.a[g, 0], p.a[g, 1], p.a[g, 2]
-            b0, b1, b2 = p.b[g, 0], p.b[g, 1], p.b[g, 2]
-            inverse = 1.0 / max(a0 * a0 + a1 * a1 + a2 * a2, LEAST_A)
-            root = np.sqrt(inverse)
-            # kb and the tangent t.
-            k0 = (a1 * b2 - a2 * b1) * inverse
-            k1 = (a2 * b0 - a0 * b2) * inverse
-            k2 = (a0 * b1 - a1 * b0) * inverse
-            t0, t1, t2 = a0 * root, a1 * root, a2 * root
+            bend, tangent, inverse, root = _measure_bend(g, p)
+            k0, k1, k2 = bend
+            t0, t1, t2 = tangent
             cosine = u0 * t0 + u1 * t1 + u2 * t2
             total += weight * (u0 * k0 + u1 * k1 + u2 * k2) / max(1.0 + cosine, LEAST_TURN_ROOM)
             scale = weight * root
@@ -183,22 +263,7 @@ def add_twist(axes, tables, twist, e, exact, x, p):
                 twist.rows[owner, at] += slope * s0
                 twist.rows[owner, at + 1] += slope * s1
                 twist.rows[owner, at + 2] += slope * s2
-            # By (a, a): -3/2 (t kb^T + kb t^T) / A; by (a, b): [t]x / (2 A).
-            aa = -1.5 * moment * weight * inverse
-            ab = 0.5 * moment * weight * inverse
-            q = p.stiffness
-            q[0, 0, g] += 2.0 * aa * t0 * k0
-            q[1, 0, g] += aa * (t1 * k0 + k1 * t0)
-            q[1, 1, g] += 2.0 * aa * t1 * k1
-            q[2, 0, g] += aa * (t2 * k0 + k2 * t0)
-            q[2, 1, g] += aa * (t2 * k1 + k2 * t1)
-            q[2, 2, g] += 2.0 * aa * t2 * k2
-            q[1, 0, 3 + g] += ab * t2
-            q[2, 0, 3 + g] -= ab * t1
-            q[2, 1, 3 + g] += ab * t0
-            q[1, 0, 6 + g] -= ab * t2
-            q[2, 0, 6 + g] += ab * t1
-            q[2, 1, 6 + g] -= ab * t0
+            _add_stiffness(g, moment * weight, bend, tangent, inverse, p)
         if e == twist.spans[k, 1]:
             clamp = twist.ends[k, 1]
             v0, v1, v2 = compute_tangent(axes, twist.starts[clamp], twist.slopes, clamp, x)

@@ -6,7 +6,7 @@ hold of it as it lies, and one that goes leaves its neighbours with the twist th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -18,10 +18,11 @@ from hose_mj.hoses.geds.twist import Twist, find_owners, measure_twist
 from hose_mj.hoses.protocol import Array
 
 _NODES = np.polynomial.legendre.leggauss(3)[0]
-_LAGRANGE = [
-    Polynomial.fromroots(np.delete(_NODES, g)) / np.prod(_NODES[g] - np.delete(_NODES, g))
+_AREAS = [
+    (Polynomial.fromroots(np.delete(_NODES, g)) / np.prod(_NODES[g] - np.delete(_NODES, g))).integ()
     for g in range(3)
 ]
+"""Integrals of the parabolas that are 1 at one Gauss point and 0 at the others."""
 
 
 def make_twist(spline: Spline, hose: Hose, arc_lengths: Sequence[float], x: Array) -> Twist:
@@ -36,9 +37,7 @@ def make_twist(spline: Spline, hose: Hose, arc_lengths: Sequence[float], x: Arra
     s = np.array(arc_lengths, dtype=np.float64)
     starts, values = spline.compute_basis(s)
     n_spans, n_clamps = len(hose.tables.first), len(s)
-    flexible = bool(np.all(hose.elasticity.torsional_stiffness > 0.0))
-    is_scalar = spline.n_dof == 3 and flexible
-    n_segments = max(n_clamps - 1, 0) if is_scalar else 0
+    n_segments = max(n_clamps - 1, 0) if has_scalar_twist(spline, hose) else 0
     ends = np.stack([np.arange(n_segments), np.arange(n_segments) + 1], axis=1)
     weights = np.array(
         [make_weights(spline, n_spans, s[first], s[last]) for first, last in ends]
@@ -67,7 +66,17 @@ def make_twist(spline: Spline, hose: Hose, arc_lengths: Sequence[float], x: Arra
         turn_rows=np.zeros(n_clamps, dtype=np.int64),
         transported=np.zeros((n_segments, 7)),
         rows=np.zeros((n_segments, spline.size + 4 * spline.n_dof)),
+        load_starts=np.zeros(0, dtype=np.int64),
+        load_slopes=np.zeros((0, 4)),
+        load_moments=np.zeros((0, 3)),
+        load_shares=np.zeros((0, n_spans, 3)),
+        applied=np.zeros((n_spans, 3)),
     )
+
+
+def has_scalar_twist(spline: Spline, hose: Hose) -> bool:
+    """Whether a hose carries a moment about its tangent without an unknown for it."""
+    return spline.n_dof == 3 and bool(np.all(hose.elasticity.torsional_stiffness > 0.0))
 
 
 def make_directors(spline: Spline, arc_lengths: Array, x: Array) -> Array:
@@ -93,14 +102,10 @@ def make_weights(spline: Spline, n_spans: int, start: float, end: float) -> Arra
     Where a clamp is inside a span the weights integrate parabolas over the part exactly.
     """
     length = spline.length / n_spans
-    weights = np.zeros((n_spans, 3))
-    for e in range(n_spans):
-        low = 2.0 * np.clip(start / length - e, 0.0, 1.0) - 1.0
-        high = 2.0 * np.clip(end / length - e, 0.0, 1.0) - 1.0
-        for g, polynomial in enumerate(_LAGRANGE):
-            area = polynomial.integ()
-            weights[e, g] = 0.5 * length * (area(high) - area(low))
-    return weights
+    spans = np.arange(n_spans)
+    low = 2.0 * np.clip(start / length - spans, 0.0, 1.0) - 1.0
+    high = 2.0 * np.clip(end / length - spans, 0.0, 1.0) - 1.0
+    return np.stack([0.5 * length * (area(high) - area(low)) for area in _AREAS], axis=1)
 
 
 def measure_compliance(hose: Hose, weights: Array) -> float:
@@ -131,7 +136,13 @@ def turn_director(twist: Twist, clamp: int, angle: float) -> None:
 
 
 def take_over_twist(
-    spline: Spline, hose: Hose, new: Twist, old: Twist, same: dict[int, int], x: Array
+    spline: Spline,
+    hose: Hose,
+    new: Twist,
+    old: Twist,
+    same: dict[int, int],
+    x: Array,
+    measure_applied: Callable[[float, float], float],
 ) -> None:
     """Gives new clamps and segments the material's present angles.
 
@@ -142,12 +153,17 @@ def take_over_twist(
         old: what was there before, a closed loop parted.
         same: the clamp in `old` of each clamp of `new` that was there.
         x: the unknowns.
+        measure_applied: gives the angle (rad) by which point moments twist the hose between two
+            arc lengths (m), beyond the angles of `old`.
     """
     for clamp, before in same.items():
         new.directors[clamp] = old.directors[before]
         new.spin[clamp] = old.spin[before]
     wanted = share_twist(spline, hose, new, old)
-    anchor = min(same, default=0)
+    for k, (first, last) in enumerate(new.places[new.ends] * hose.tables.span_length):
+        wanted[k] += measure_applied(float(first), float(last))
+    # Without torsional stiffness there is no segment, however many clamps.
+    anchor = min(same, default=0) if len(wanted) > 0 else 0
     span = make_span()
 
     def measure(k: int) -> float:
@@ -205,11 +221,17 @@ def join_ends(twist: Twist, spin: float) -> Twist:
     )
 
 
-def part_ends(spline: Spline, hose: Hose, twist: Twist, x: Array) -> Twist:
+def part_ends(
+    spline: Spline,
+    hose: Hose,
+    twist: Twist,
+    x: Array,
+    measure_applied: Callable[[float, float], float],
+) -> Twist:
     """Returns the pieces of a closed loop as segments of an open hose; see `join_ends`.
 
     The first piece and the last each get the angle that their compliance asks for, so the material
-    between them is where it really is.
+    between them is where it really is; `measure_applied` as in `take_over_twist`.
     """
     if len(twist.ends) == len(twist.angle):
         return twist
@@ -223,8 +245,11 @@ def part_ends(spline: Spline, hose: Hose, twist: Twist, x: Array) -> Twist:
         torque=np.zeros_like(angle),
         rows=np.zeros((len(angle), twist.rows.shape[1])),
     )
+    start, end = twist.places[twist.ends[0]] * hose.tables.span_length
+    parted.trial[0] += measure_applied(float(start), float(end))
+    wanted = float(parted.trial[0])
     measure_twist(spline.axes, hose.tables, parted, x, make_span())
-    gap = float(parted.trial[0] - angle[0])
+    gap = float(parted.trial[0] - wanted)
     for clamp in (0, len(parted.starts) - 1):
         turn_director(parted, clamp, gap)
     return parted

@@ -163,14 +163,15 @@ class ChainModel(MujocoModel[ChainMotion]):
         tangents = motion.tangent(self.layout.nodes[1:-1])
         return self.layout.interpolate(arc_lengths, -np.einsum("ni,ni->n", on_rest, tangents))
 
-    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
-        """Moves to static equilibrium, velocity zero."""
+    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> bool:
+        """Moves to static equilibrium, velocity zero; returns whether it is stable."""
         system = self._static_system(held, loads)
-        multipliers = solve_equilibrium(system)
+        multipliers, is_stable = solve_equilibrium(system)
         self.write_targets(held)
         self.data.qpos[:] = system.data.qpos
         self.data.qvel[:], self.data.qacc_warmstart[:] = 0.0, 0.0
         self.keep_settled(multipliers, held)
+        return is_stable
 
     # What acts on it, and steps.
 
@@ -248,16 +249,10 @@ class MujocoChainHose(MujocoHose):
     def _is_root(self, arc_length: float) -> bool:
         return arc_length == 0.0
 
-    def solve_static(self) -> None:
-        """Moves the hose to static equilibrium; see `MujocoHose.solve_static`.
-
-        Raises:
-            InputError: a chain with obstacles, which must come to rest by itself.
-            StepError: no equilibrium was found; the state before is kept.
-        """
+    def _check_static(self) -> None:
+        """A chain with obstacles must come to rest by itself."""
         if self.settings.obstacles:
             raise InputError("obstacles", len(self.settings.obstacles), "none in a chain's statics")
-        super().solve_static()
 
 
 def check_plain(name: str, spec: HoseSpec) -> None:
@@ -266,6 +261,8 @@ def check_plain(name: str, spec: HoseSpec) -> None:
     for what in ("rest_strain", "rest_curvature", "rest_torsion", "drag"):
         if getattr(spec, what) != 0.0:
             raise InputError(what, getattr(spec, what), f"0 for a {name}")
+    if spec.bending_stiffness == 0.0:
+        raise InputError("bending_stiffness", 0.0, f"above 0 for a {name}")
     if spec.fittings or not spec.is_isotropic:
         what = "fittings" if spec.fittings else "second_bending_stiffness"
         raise InputError(what, getattr(spec, what), f"none for a {name}")

@@ -155,10 +155,10 @@ class FlexModel(MujocoModel[FlexMotion]):
 
     # Statics.
 
-    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
-        """Moves to static equilibrium with rigid edges and holds, velocity zero."""
+    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> bool:
+        """Moves to static equilibrium with rigid edges and holds; returns whether it is stable."""
         system = self._static_system(held, loads)
-        multipliers = solve_equilibrium(system)
+        multipliers, is_stable = solve_equilibrium(system)
         self.write_targets(held)
         self.data.qacc_warmstart[:] = 0.0
         self._set_state(system.pose, np.zeros_like(system.pose))
@@ -171,6 +171,7 @@ class FlexModel(MujocoModel[FlexMotion]):
             wrenches += [total.force, total.moment] if item.hold.fixes_tangent else [total.force]
         self.keep_settled(np.concatenate(wrenches), held)
         self._tensions, self._forces_known = -multipliers[:count], True
+        return is_stable
 
     def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> flex_rod.FlexSystem:
         vertices = [self.layout.find_vertices(item.hold) for item in held]

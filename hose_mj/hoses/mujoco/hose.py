@@ -18,12 +18,24 @@ from numpy.typing import ArrayLike
 from hose_mj.errors import InputError
 from hose_mj.hoses import inputs
 from hose_mj.hoses.inputs import check_arc_lengths, check_vector
+from hose_mj.hoses.laying import even_out
 from hose_mj.hoses.mujoco import chain_layout
 from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings
 from hose_mj.hoses.mujoco.flex_layout import FlexMotion
 from hose_mj.hoses.mujoco.model import MujocoModel
-from hose_mj.hoses.protocol import Array, Curve, Energies, Hold, Linearization, Momentum, Reaction
+from hose_mj.hoses.protocol import (
+    Array,
+    Curve,
+    Energies,
+    Equilibrium,
+    Hold,
+    Linearization,
+    Momentum,
+    Reaction,
+    warn_of_lost_moment,
+)
+from hose_mj.hoses.snapshots import take_array, take_count, undo
 from hose_mj.hoses.spec import HoseSpec, check_number
 
 
@@ -90,6 +102,15 @@ class MujocoHose(ABC):
         """Unit tangent, shape (k, 3): the segment's, at a node the mean of its neighbours'."""
         return self._model.motion().tangent(self._arc_lengths(arc_length))
 
+    def frame(self, arc_length: ArrayLike) -> Array:
+        """Rotation matrices (k, 3, 3) of the segments; columns: tangent and two directors.
+
+        Of a hose without twist the directors are any.
+        """
+        places = self._arc_lengths(arc_length)
+        frames = [self._model.motion().frame(float(s)) for s in places]
+        return np.array([chain_layout.rotation_matrix(one) for one in frames]).reshape(-1, 3, 3)
+
     def curvature(self, arc_length: ArrayLike) -> Array:
         """Bending per length at the nodes (k,), 1/m: straight lines between and beyond them."""
         return self._model.motion().curvature(self._arc_lengths(arc_length))
@@ -126,7 +147,8 @@ class MujocoHose(ABC):
     def reset(self, curve: Curve, velocity: Curve | None = None) -> None:
         """Lays the hose along a curve, at rest or with a velocity (m/s); drops holds and loads."""
         made = self._make_model([])
-        points = inputs.sample_curve(curve, self.spec.length, made.layout.nodes)
+        even = even_out(curve, self.spec.length)
+        points = inputs.sample_curve(even, self.spec.length, made.layout.nodes)
         inputs.check_curve_points(points)
         points = self._check_points("curve", points)
         speeds = None
@@ -214,9 +236,15 @@ class MujocoHose(ABC):
         self._add_load(Load(s, check_vector("force", force), np.zeros(3)))
 
     def apply_moment(self, arc_length: float, moment: ArrayLike) -> None:
-        """Adds a point moment (3,) N m in the world frame that acts until `clear_loads`."""
+        """Adds a point moment (3,) N m in the world frame that acts until `clear_loads`.
+
+        A hose without twist, or without torsional stiffness, says by a `HoseWarning` what it loses.
+        """
         s = inputs.check_place(arc_length, self.spec.length)
-        self._add_load(Load(s, np.zeros(3), check_vector("moment", moment)))
+        vector = check_vector("moment", moment)
+        self._add_load(Load(s, np.zeros(3), vector))
+        if not self.twists or self.spec.torsional_stiffness == 0.0:
+            warn_of_lost_moment(vector, self.tangent(s)[0], s, stacklevel=3)
 
     def clear_loads(self) -> None:
         """Drops all point forces and moments; gravity stays."""
@@ -237,17 +265,21 @@ class MujocoHose(ABC):
         self._model.step(n_steps, self._held, self._loads)
         self._held = [held.arrived() for held in self._held]
 
-    def solve_static(self) -> None:
+    def solve_static(self) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads, velocity zero.
 
         Holds are exact here. Unstable equilibria are left, but not by a shape exactly in one, and
-        not where a moment acts.
+        not where a moment acts; a `HoseWarning` says so. A chain of rigid parts cannot fold within.
 
         Raises:
+            InputError: a chain with obstacles.
             StepError: no equilibrium was found; the state before is kept.
         """
-        self._model.settle(self._held, self._loads)
+        self._check_static()
+        found = Equilibrium(self._model.settle(self._held, self._loads), False, 1.0)
         self._held = [held.arrived() for held in self._held]
+        found.warn(stacklevel=3)
+        return found
 
     def linearize(self) -> Linearization:
         """Mass, tangent stiffness and constraints at rest, in the model's own coordinates."""
@@ -269,17 +301,29 @@ class MujocoHose(ABC):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Returns to a snapshot of this hose; `InputError` for what is none."""
-        inputs.restore_snapshot(state, self.snapshot(), self._restore)
+        """Returns to a snapshot of this hose.
 
-    def _restore(self, state: dict[str, Any]) -> None:
-        held = [Held.from_numbers(row) for row in np.asarray(state["holds"])]
-        made = self._make_model(held)
-        made.set_numbers(np.asarray(state["numbers"]))
-        made.replay = np.asarray(state["replay"])
-        self._model, self._held = made, held
-        self._loads = [Load.from_numbers(row) for row in np.asarray(state["loads"])]
-        self._next_number = int(state["next_number"])
+        Raises:
+            InputError: what is no snapshot of this hose; nothing has changed then.
+        """
+        with undo(lambda: None):
+            rows = take_array(state, "holds", (None, Held.WIDTH))
+            held = [Held.from_numbers(row) for row in rows]
+            check_arc_lengths([item.hold.arc_length for item in held], self.spec.length)
+            rows = take_array(state, "loads", (None, Load.WIDTH))
+            loads = [Load.from_numbers(row) for row in rows]
+            check_arc_lengths([load.arc_length for load in loads], self.spec.length)
+            next_number = take_count(state, "next_number")
+            made = self._make_model(held)
+            made.set_numbers(take_array(state, "numbers", (None,)))
+            replay = take_array(state, "replay", (None,))
+            if len(replay) not in (0, len(made.get_numbers())):
+                raise InputError(
+                    "size of replay of a snapshot", len(replay), "that of numbers or 0"
+                )
+            made.replay = replay
+        self._model, self._held, self._loads = made, held, loads
+        self._next_number = next_number
 
     # What a kind of hose may say for itself.
 
@@ -290,6 +334,10 @@ class MujocoHose(ABC):
     def _check_direction(self, tangent: Array) -> Array:
         """Returns a unit tangent (3,); raises `InputError` for one that this hose cannot have."""
         return tangent
+
+    def _check_static(self) -> None:
+        """Raises `InputError` for a hose that cannot be solved for its equilibrium."""
+        return None
 
     def _is_root(self, arc_length: float) -> bool:
         """Whether a clamp there makes a part of the hose part of the world while it is at rest."""

@@ -95,8 +95,8 @@ class MujocoModel(ABC, Generic[Motion]):
         """Moment about the tangent (k,), N m, after `update_forces`."""
 
     @abstractmethod
-    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> None:
-        """Moves to static equilibrium, velocity zero."""
+    def settle(self, held: Sequence[Held], loads: Sequence[Load]) -> bool:
+        """Moves to static equilibrium, velocity zero; returns whether it is stable."""
 
     @abstractmethod
     def _static_system(self, held: Sequence[Held], loads: Sequence[Load]) -> StaticSystem:

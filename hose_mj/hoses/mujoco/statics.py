@@ -141,8 +141,8 @@ class Metric:
         return np.asarray(np.linalg.solve(self._factor, right))
 
 
-def solve_equilibrium(system: StaticSystem) -> Array:
-    """Brings the system to a static equilibrium near its state; returns lambda.
+def solve_equilibrium(system: StaticSystem) -> tuple[Array, bool]:
+    """Brings the system to an equilibrium near its state; returns lambda and if it is stable.
 
     Plain Newton steps first. Where they fail or end in an unstable equilibrium, guarded ones follow
     from the start; not with moments, which have no energy when they keep their direction in space.
@@ -158,8 +158,9 @@ def solve_equilibrium(system: StaticSystem) -> Array:
         multipliers = _iterate(system, guarded, iterations)
         if multipliers is None:
             continue
-        if iterations == _GUARDED or Metric(system).is_stable(system):
-            return multipliers
+        is_stable = Metric(system).is_stable(system)
+        if iterations == _GUARDED or is_stable:
+            return multipliers, is_stable
     raise StepError(
         "no static equilibrium was found: a residual of "
         f"{system.residual(Metric(system).multipliers):.1e} of the largest moments is left "

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+pytestmark = pytest.mark.filterwarnings("ignore:the hose is laid:hose_mj.errors.HoseWarning")
 EI = 0.05
 WEIGHT = 0.1 * 9.81
 HEAVY = {

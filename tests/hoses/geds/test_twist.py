@@ -10,6 +10,7 @@ from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.spec import Fitting, HoseSpec
 
+pytestmark = pytest.mark.filterwarnings("ignore:the hose is laid:hose_mj.errors.HoseWarning")
 EI, GJ, DENSITY, GRAVITY = 0.05, 0.04, 0.1, 9.81
 X, Y, Z = np.eye(3)
 forms = pytest.mark.parametrize("form", ["scalar", "theta"])

@@ -268,8 +268,9 @@ class MujocoHose(ABC):
         """Moves the hose to static equilibrium under its holds and loads, velocity zero.
 
         Holds are exact here. Unstable equilibria are left, but not by a shape exactly in one, and
-        not where a moment acts; a `HoseWarning` says so, but with a moment: it has no energy, and the
-        verdict, of the stiffness's symmetric part, may err. A chain of rigid parts cannot fold within.
+        not where a moment acts; a `HoseWarning` says so. A moment has no energy: the verdict is
+        then of the stiffness's symmetric part, may err, and gives no warning. A chain of rigid
+        parts cannot fold within.
 
         Raises:
             InputError: a chain with obstacles.

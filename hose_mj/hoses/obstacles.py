@@ -128,7 +128,7 @@ class ContactLaw:
 
     def complete(self, spec: HoseSpec) -> ContactLaw:
         """Returns the law of a hose, with the numbers that were left to it."""
-        k, width, damping, stick = self.stiffness, self.width, self.damping_time, None
+        k, width, damping = self.stiffness, self.width, self.damping_time
         if k is None:
             k = spec.axial_stiffness / (np.pi * spec.outer_radius**2)
         if width is None:
@@ -136,8 +136,8 @@ class ContactLaw:
         if damping is None:
             damping = 2.0 * np.sqrt(spec.linear_density / k)
         stick = _SOFTER * k if self.stick_stiffness is None else self.stick_stiffness
-        numbers = {"stiffness": k, "width": width, "damping_time": damping}
-        return replace(self, **numbers, stick_stiffness=stick, slip_speed=None)
+        full = replace(self, stiffness=k, width=width, damping_time=damping, slip_speed=None)
+        return replace(full, stick_stiffness=stick)
 
     def find_gap(self, load: float) -> float:
         """The gap between the surfaces (m) at which a complete law carries a load (N/m).

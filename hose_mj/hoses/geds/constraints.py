@@ -499,9 +499,9 @@ class ConstraintSet:
     def _across(self, tangent: Array) -> Array:
         """Unit vectors of the hose's space that are normal to a tangent, (d - 1, 3)."""
         if self._spline.dimension == 2:
-            return np.cross(self._spline.normal, tangent)[None]
+            return twist_segments.cross(self._spline.normal, tangent)[None]
         first = twist_segments.compute_normal(tangent)
-        return np.stack([first, np.cross(tangent, first)])
+        return np.array([first, twist_segments.cross(tangent, first)])
 
     def _rebuild(self, spin: float = 0.0) -> None:
         """Makes everything anew from the list of holds; the material stays as it lies.
@@ -594,7 +594,7 @@ class ConstraintSet:
             rows[c, :, c] = values[0]
         if held.tangent is not None:
             for k, direction in enumerate(self._across(held.tangent)):
-                rows[d + k, :, :d] = np.outer(values[1], direction[self._spline.dims])
+                rows[d + k, :, :d] = values[1][:, None] * direction[self._spline.dims]
             if self._spline.has_theta:
                 rows[-1, :, 3] = values[0]
         return rows.reshape(len(rows), 4 * n_dof)

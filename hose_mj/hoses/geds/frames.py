@@ -220,7 +220,7 @@ def reset_frames(axes, hose, constraints, state, p):
             angles[row] = _unwrap(angle, angles[max(row - 1, 0)])
             length = tables.span_length
             _add_fit(e, tables.value[e, g], 1.0, angles[row], band, change)
-            _add_fit(e, tables.first[e, g] * length, 1.0, old[9] * length, band, change)
+            _add_fit(e, tables.first[e, g], length * length, old[9], band, change)
         else:
             clamp = row - 3 * n_spans
             angle = _unwrap(angle, angles[_find_gauss_point(tables, n_spans, twist.places[clamp])])

@@ -97,5 +97,6 @@ def check_rotation(name: str, value: ArrayLike) -> Array:
         raise InputError(name, value, "a rotation matrix (3, 3)") from None
     fits = matrix.shape == (3, 3) and bool(np.all(np.isfinite(matrix)))
     if not fits or np.abs(matrix.T @ matrix - np.eye(3)).max() > 1e-6 or np.linalg.det(matrix) < 0:
-        raise InputError(name, value, "a rotation matrix (3, 3): orthogonal and right-handed")
+        valid = "a rotation matrix (3, 3): orthogonal and right-handed"
+        raise InputError(name, matrix.tolist(), valid)
     return matrix

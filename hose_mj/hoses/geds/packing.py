@@ -23,7 +23,6 @@ from numba.extending import (
 
 from hose_mj.jit import compiled
 
-
 _intrinsic: Any = intrinsic
 
 
@@ -41,7 +40,7 @@ class _AddressModel(models.PrimitiveModel):
         super().__init__(manager, kind, cgutils.intp_t)
 
 
-@unbox(Address)  # type: ignore[untyped-decorator]
+@unbox(Address)
 def _unbox_address(kind: Address, number: Any, c: Any) -> NativeValue:
     return NativeValue(c.pyapi.long_as_longlong(number))
 
@@ -54,7 +53,8 @@ def _disown(context: Any, builder: Any, kind: Any, value: Any) -> Any:
             setattr(array, owner, cgutils.get_null_value(getattr(array, owner).type))
         return array._getvalue()
     if isinstance(kind, types.BaseTuple):
-        for k, part in enumerate(kind):
+        parts: Any = kind
+        for k, part in enumerate(parts):
             own = _disown(context, builder, part, builder.extract_value(value, k))
             value = builder.insert_value(value, own, k)
     return value
@@ -115,7 +115,7 @@ class Packed:
 
     def __init__(self, record: Any) -> None:
         self._record = record  # keeps its arrays alive
-        self.kind = Address(typeof(record))  # type: ignore[no-untyped-call]
+        self.kind = Address(typeof(record))
         self._room = np.zeros(_pack(record, 0) // 8 + 1, dtype=np.int64)
         self.address = self._room.ctypes.data
         _pack(record, self.address)

@@ -269,7 +269,9 @@ class MujocoHose(ABC):
         """Moves the hose to static equilibrium under its holds and loads, velocity zero.
 
         Holds are exact here. Unstable equilibria are left, but not by a shape exactly in one, and
-        not where a moment acts; a `HoseWarning` says so. A chain of rigid parts cannot fold within.
+        not where a moment acts; a `HoseWarning` says so. A moment has no energy: the verdict is
+        then of the stiffness's symmetric part, may err, and gives no warning. A chain of rigid
+        parts cannot fold within.
 
         Raises:
             InputError: a chain with obstacles.
@@ -278,7 +280,8 @@ class MujocoHose(ABC):
         self._check_static()
         found = Equilibrium(self._model.settle(self._held, self._loads), False, 1.0)
         self._held = [held.arrived() for held in self._held]
-        found.warn(stacklevel=3)
+        if not any(np.any(load.moment) for load in self._loads):
+            found.warn(stacklevel=3)
         return found
 
     def linearize(self) -> Linearization:

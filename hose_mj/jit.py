@@ -153,20 +153,22 @@ class _CacheFiles:
         self._open().flush()
 
 
-def _decorate(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def _decorate(*, apart: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """njit with these options and a disk cache that notices a change in any kernel it inlines.
 
-    numba looks at a function's own file only: after an update it would go on with the old code of
+    With `apart`, compiled callers call it where others are put into them. numba looks at a function's
+    own file only: after an update it would go on with the old code of
     what is inlined from other files. So the name of the cache file holds a fingerprint.
     """
 
     def decorator(function: Callable[..., Any]) -> Any:
-        made = numba.njit(**{**_OPTIONS, **options})(function)
+        own = {"pipeline_class": _BareCompiler} if _LINKS and "_nrt" in options else {}
+        made = numba.njit(**{**_OPTIONS, **options, **own})(function)
         _name_cache(made, "")
         _MADE.add(made)
         is_dear = not function.__module__.startswith(_SMALL)
         if is_dear and _LINKS and _NO_PYTHON and hasattr(made, "get_call_template"):
-            _serve_callers(made, function, options)
+            _serve_callers(made, function, options, _ApartCompiler if apart else _LinkedCompiler)
         return made
 
     return decorator
@@ -181,10 +183,21 @@ def _name_cache(made: Any, suffix: str) -> None:
         made._cache._cache_file = _CacheFiles(made._cache._cache_path, name, stamp)
 
 
+class _BareLibrary(JITCodeLibrary):
+    """Machine code of what allocates nothing: no references to prune before it is optimized."""
+
+    def _optimize_final_module(self) -> None:
+        manager, builder = self._codegen._module_pass_manager()
+        manager.run(self._final_module, builder)
+
+
 class _LinkedLibrary(JITCodeLibrary):
     """Code that others link into theirs, as is: no machine code is made of it."""
 
     is_apart = False
+
+    def _optimize_final_module(self) -> None:
+        """Leaves that to whoever links the code: it optimizes all of it together."""
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
@@ -194,7 +207,7 @@ class _LinkedLibrary(JITCodeLibrary):
             # May be defined in many modules, and dropped where nobody calls it.
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"
-                if self.is_apart:
+                if self.is_apart and f"{len(self.name)}{self.name}" in function.name:
                     function.add_function_attribute("noinline")
         for variable in self._shared_module.global_variables:
             if variable.name.startswith(_ENVIRONMENT):
@@ -211,25 +224,33 @@ class _ApartLibrary(_LinkedLibrary):
     is_apart = True
 
 
-class _LinkedCompiler(Compiler):
-    """Compiles a function for compiled callers."""
+class _BareCompiler(Compiler):
+    """Compiles a function as numba does, but into a library of ours."""
 
-    library: Any = _LinkedLibrary
+    library: Any = _BareLibrary
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compiles a function as numba does, but into a `_LinkedLibrary`."""
+        """Compiles a function into a library of the class `library`."""
         self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
         return super().compile_extra(func)  # type: ignore[no-untyped-call]
 
 
+class _LinkedCompiler(_BareCompiler):
+    """For compiled callers."""
+
+    library = _LinkedLibrary
+
+
 class _ApartCompiler(_LinkedCompiler):
-    """The same for a function that is not to be inlined."""
+    """For compiled callers that are to call it."""
 
     library = _ApartLibrary
 
 
-def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str, Any]) -> None:
+def _serve_callers(
+    made: Any, function: Callable[..., Any], options: Mapping[str, Any], compiler: type[Compiler]
+) -> None:
     """Gives compiled callers a version of a function that Python cannot call.
 
     The function itself is for Python: it is compiled only where Python calls it.
@@ -237,7 +258,7 @@ def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str
 
     @cache
     def make_inner() -> Any:
-        settings = {**_OPTIONS, "pipeline_class": _LinkedCompiler, **options, **_NO_PYTHON}
+        settings = {**_OPTIONS, **options, **_NO_PYTHON, "pipeline_class": compiler}
         inner = numba.njit(**settings)(function)
         _name_cache(inner, ".inner")
         return inner
@@ -251,9 +272,9 @@ def _serve_callers(made: Any, function: Callable[..., Any], options: Mapping[str
 compiled = _decorate()
 # For loops that must give, bit for bit, what their source gives as plain Python: no contractions.
 bitwise = _decorate(fastmath=False, **_BARE)
-kernel = _decorate(**_BARE)
+kernel = _decorate(**_BARE, forceinline=False)
 # A long function with several callers: once in each entry's code, not once in each caller.
-apart = _decorate(**_BARE, **({"pipeline_class": _ApartCompiler} if _LINKS else {}))
+apart = _decorate(apart=True, **_BARE, forceinline=False)
 # Over all cores, with the arithmetic of its source; what it calls has its own options.
 parallel = _decorate(fastmath=False, parallel=True)
 # For small functions of a record with many fields, which a call would have to copy one by one.

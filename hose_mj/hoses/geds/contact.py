@@ -55,11 +55,12 @@ def _find_slot(memory, q, g):
 
 
 @apart
-def _compute_force(axes, contact, q, g, start, touch, motion, is_trial):
+def _compute_force(axes, contact, q, g, start, touch, motion, trial):
     """Force per length at a point and what makes its matrix.
 
-    In a trial, one of Newton's, a point that slid one way and now would slide back is taken to
-    stick, whatever that takes: the next trial tells whether it can.
+    In a trial, one of Newton's (1.0, else 0.0: numba compiles once for each truth value), a point
+    that slid one way and now would slide back is taken to stick, whatever that takes: the next
+    trial tells whether it can.
 
     Returns force (3,), N, its slope, what of z is left (3,), direction of the slide (3,) and the
     stiffness across it.
@@ -96,7 +97,7 @@ def _compute_force(axes, contact, q, g, start, touch, motion, is_trial):
     z = (z[0] - up * normal[0], z[1] - up * normal[1], z[2] - up * normal[2])
     stick, limit = scale * contact.law[STICK], friction * N
     held, left, slide, stiffness = rub(stick, limit, z)
-    if is_trial and _turns_back(contact, q, g, slide):
+    if trial > 0.0 and _turns_back(contact, q, g, slide):
         held, left, slide, stiffness = rub(stick, np.inf, z)
     force = (force[0] + held[0], force[1] + held[1], force[2] + held[2])
     return force, N, slope, left, slide, stiffness
@@ -160,7 +161,7 @@ def add_contact(axes, contact, x, motion, exact, gradient, band):
                 q = q + 1 if is_fast else find_next(contact, at, end, touch[0], ball[3])
                 if touch[0] >= law[MARGIN]:
                     continue
-                answer = _compute_force(axes, contact, at, g, start, touch, motion, True)
+                answer = _compute_force(axes, contact, at, g, start, touch, motion, 1.0)
                 force, N = answer[0], answer[1]
                 matrix = _make_matrix(contact, touch, answer, motion.step, exact)
                 n_pairs = _keep_pair(contact, n_pairs, (at, g, e), force, matrix, touch[4])
@@ -270,7 +271,7 @@ def measure_contact_left(axes, contact, x, motion):
             moved = max(moved, abs(now[c] - before[c]))
         is_fast = moved > 0.5 * _FAST * contact.law[RADIUS]
         touch = compute_gap(axes, contact, q, g, start, x, motion, is_fast)
-        force = _compute_force(axes, contact, q, g, start, touch, motion, False)[0]
+        force = _compute_force(axes, contact, q, g, start, touch, motion, 0.0)[0]
         d0, d1, d2 = now[0] - pairs[k, 11], now[1] - pairs[k, 12], now[2] - pairs[k, 13]
         m = pairs[k]
         r0 = force[0] - m[2] + m[5] * d0 + m[8] * d1 + m[9] * d2
@@ -325,7 +326,7 @@ def _remember(axes, contact, q, g, start, touch, motion, state):
         if memory[q, k, 0] == -(g + 2.0):
             slot = k
             memory[q, k, 0] = g + 2.0
-    answer = _compute_force(axes, contact, q, g, start, touch, motion, False)
+    answer = _compute_force(axes, contact, q, g, start, touch, motion, 0.0)
     if answer[1] == 0.0:
         if slot >= 0:
             memory[q, slot, 0] = 0.0
@@ -371,10 +372,10 @@ def compute_forces(axes, contact, x, v, forces, reactions):
                 if is_skipped(contact, at, g):
                     q += 1
                     continue
-                touch = compute_gap(axes, contact, at, g, start, x, motion, False)
+                touch = compute_gap(axes, contact, at, g, start, x, motion, ball[2] < 0.0)
                 q = find_next(contact, at, end, touch[0], ball[3])
                 if touch[0] < contact.law[MARGIN]:
-                    answer = _compute_force(axes, contact, at, g, start, touch, motion, False)
+                    answer = _compute_force(axes, contact, at, g, start, touch, motion, 0.0)
                     _add_reaction(contact, at, g, answer[0], touch[4], forces, reactions)
 
 

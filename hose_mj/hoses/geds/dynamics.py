@@ -244,8 +244,7 @@ class Dynamics:
     def make_work(self) -> records.Work:
         """Returns work arrays for the constraints of now."""
         n_points = len(self.state.x) // len(self.axes)
-        made: records.Work = records.make_work(n_points, len(self.axes), self.constraints.n_rows)
-        return made
+        return records.make_work(n_points, len(self.axes), self.constraints.n_rows)
 
     def build_tangent(self) -> records.Work:
         """Returns work arrays with dU + C v less moments and contact in the gradient.

@@ -14,7 +14,6 @@ from hose_mj.hoses.geds.contact_law import Contact
 from hose_mj.hoses.geds.span import Elasticity, Span, make_span
 from hose_mj.hoses.geds.twist import Twist
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import compiled
 
 DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE, DEPENDENT_CONSTRAINTS = range(5)
 VERDICTS = (
@@ -167,8 +166,7 @@ class Work(NamedTuple):
     start: Array
 
 
-@compiled
-def make_work(n_control_points, n_dof, n_rows):
+def make_work(n_control_points: int, n_dof: int, n_rows: int) -> Work:
     """Returns work arrays for n control points of n_dof unknowns each and m rows.
 
     The rows are those of the constraints and one for each segment that has twist.

@@ -156,9 +156,9 @@ class _CacheFiles:
 def _decorate(*, apart: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """njit with these options and a disk cache that notices a change in any kernel it inlines.
 
-    With `apart`, compiled callers call it where others are put into them. numba looks at a function's
-    own file only: after an update it would go on with the old code of
-    what is inlined from other files. So the name of the cache file holds a fingerprint.
+    numba looks at a function's own file only: after an update it would go on with the old code of
+    what is inlined from other files. So the name of the cache file holds a fingerprint. With
+    `apart`, compiled callers call the function, where others are put into them.
     """
 
     def decorator(function: Callable[..., Any]) -> Any:
@@ -187,7 +187,8 @@ class _BareLibrary(JITCodeLibrary):
     """Machine code of what allocates nothing: no references to prune before it is optimized."""
 
     def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager()
+        codegen: Any = self._codegen
+        manager, builder = codegen._module_pass_manager()
         manager.run(self._final_module, builder)
 
 

@@ -84,7 +84,7 @@ class Packed:
 
 def _check_layout() -> None:
     """Raises `ImportError` for a version of numba that lays arrays out otherwise."""
-    found = datamodel.default_manager[types.float64[::1]]._fields
+    found = datamodel.registry.default_manager[types.float64[::1]]._fields
     if tuple(found) != _ARRAY:
         raise ImportError(f"numba holds of an array {found}; hose_mj knows {_ARRAY}")
 

@@ -59,13 +59,14 @@ class ConstraintSet:
     Attributes:
         rows: what the kernels read and write; made anew by every change.
         is_closed: whether the hose is a closed loop.
+        is_moved: whether a hold was made or moved since `measure_jump`.
 
     The point moments on the hose are known here for their part along the tangent alone.
     """
 
     def __init__(self, spline: Spline, hose: records.Hose, x: Array) -> None:
         self._spline, self._hose = spline, hose
-        self.is_closed = False
+        self.is_closed = self.is_moved = False
         self._held: list[_Held] = []
         self._compliant: list[Hold] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
@@ -144,6 +145,7 @@ class ConstraintSet:
             )
             raise InputError("number of rows of all holds", in_all, valid)
         self._n_made += 1
+        self.is_moved = True
         self._held.append(self._make_held(hold, point, tangent, np.zeros(n_rows)))
         self._rebuild()
         return hold
@@ -179,9 +181,20 @@ class ConstraintSet:
         if aim is not None and held.tangent is not None:
             _check_ahead(aim, held.tangent)
         held.position, held.tangent = point, aim
+        self.is_moved = True
         self._aim(held, turns=tangent is not None)
         if spin != 0.0:
             self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
+
+    def measure_jump(self) -> float:
+        """The farthest that a hold goes within the next step (m)."""
+        self.is_moved = False
+        d, rows = self._spline.dimension, self.rows
+        ways = [
+            rows.after[h.first : h.first + d] - rows.before[h.first : h.first + d]
+            for h in self._held
+        ]
+        return max((float(np.linalg.norm(way)) for way in ways), default=0.0)
 
     def check_director(self, director: ArrayLike, tangent: Array) -> Array:
         """Returns the part of a director (3,) across a unit tangent, as a unit vector.

@@ -237,6 +237,11 @@ class ContactSet:
         self._memory[:] = 0.0
         self._found[:] = 0.0
 
+    @property
+    def deepest(self) -> float:
+        """The greatest depth of a contact since the last reset, in radii; 0 where nothing sank."""
+        return float(self._found[contact_law.DEEPEST])
+
     def set_closed(self, is_closed: bool) -> None:
         """Says whether the hose is a closed loop, whose ends do not touch each other."""
         self._is_closed = is_closed

@@ -24,6 +24,7 @@ from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.material_frames import check_rotation
 from hose_mj.hoses.geds.spline import Spline
+from hose_mj.hoses.health import Health, HealthWatch
 from hose_mj.hoses.inputs import check_count, check_records, check_rows, check_vector
 from hose_mj.hoses.laying import LARGEST_LAID_STRAIN
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
@@ -77,6 +78,7 @@ class GedsHose(SplineBody):
         max_iterations: Newton iterations in a stage before the careful fallback.
         obstacles: what the hose may touch; `set_obstacles` changes it.
         contact_law: numbers of the contact; None for the defaults.
+        strict: whether what `health` warns of is a `StepError` instead.
 
     Attributes:
         spec, gravity, scheme: as given.
@@ -102,6 +104,7 @@ class GedsHose(SplineBody):
         max_iterations: int = 20,
         obstacles: Sequence[Obstacle] = (),
         contact_law: ContactLaw | None = None,
+        strict: bool = False,
     ) -> None:
         check_spec(spec)
         check_number("timestep", timestep)
@@ -126,6 +129,7 @@ class GedsHose(SplineBody):
             *(scheme, float(timestep), self._state, self._counts),
         )
         self.coupling = BodyCoupling(self._dynamics)
+        self._watch = HealthWatch(spec.length, strict)
         if check_records("obstacles", obstacles, Obstacle):
             self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
@@ -177,6 +181,7 @@ class GedsHose(SplineBody):
         self._start(start)
         strains = self._measure_strains()[:, 0]
         largest = float(strains[np.argmax(np.abs(strains))])
+        self._watch.laid_strain = largest
         if abs(largest) > LARGEST_LAID_STRAIN:
             force = abs(largest) * self.spec.axial_stiffness
             warnings.warn(
@@ -389,9 +394,21 @@ class GedsHose(SplineBody):
             InputError: n_steps is not a whole number at or above 0.
             StepError: a step that no fallback finished; the last step that worked is kept.
         """
-        if check_count("n_steps", n_steps, 0) > 0:
-            self._warn_of_spin()
-            self._dynamics.advance(int(n_steps))
+        if check_count("n_steps", n_steps, 0) == 0:
+            return
+        self._warn_of_spin()
+        if self._constraints.is_moved:
+            self._watch.check_jump(self._constraints.measure_jump())
+        self._dynamics.advance(int(n_steps))
+        steps, _, fallbacks = self._counts.tolist()
+        self._watch.check_steps(steps, fallbacks, self.contacts.deepest)
+
+    @property
+    def health(self) -> Health:
+        """How well it went since the last reset."""
+        steps, _, fallbacks = self._counts.tolist()
+        deepest = self.contacts.deepest
+        return self._watch.report(steps, fallbacks, deepest, self.measure_least_stretch)
 
     def solve_static(self, load_steps: int = 1) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.
@@ -413,6 +430,7 @@ class GedsHose(SplineBody):
             raise InputError("holds of a closed loop", "none", valid)
         self._warn_of_spin()
         self._dynamics.solve_static(int(load_steps))
+        self._constraints.is_moved = False
         self.contacts.forget()
         least = self.measure_least_stretch()
         found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
@@ -473,6 +491,7 @@ class GedsHose(SplineBody):
 
     def _start(self, director: Array | None = None) -> None:
         self._counts[STEPS] = 0
+        self._watch.reset(self.fallbacks)
         self.contacts.set_closed(False)
         self.contacts.forget()
         self._loads.clear()

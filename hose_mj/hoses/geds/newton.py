@@ -235,14 +235,10 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
                 factor = limits.rotation_cap / turn
         _move(twist, factor, x, work)
         if factor == 1.0 and largest <= limits.tolerance:
-            wanted = _measure_scale(hose, stage, constraints, loads, x, work)
-            wanted *= limits.force_tolerance
-            left = _measure_strain_left(axes, hose, work.step)
-            if left <= wanted and loads.contact.found[TOUCHED] > 0.0:
-                left += _measure_contact_left(axes, stage, fraction, loads.contact, x, work)
-            if left <= wanted:
+            left = _measure_left(axes, hose, stage, constraints, fraction, loads, x, work)
+            if left <= limits.force_tolerance:
                 return DONE, iteration, fallbacks
-            if iteration == limits.max_iterations and not left > _STUCK * wanted:
+            if iteration == limits.max_iterations and left <= _STUCK * limits.force_tolerance:
                 return DONE, iteration, fallbacks + 1
         if iteration == limits.max_iterations:
             return NOT_CONVERGED, iteration, fallbacks
@@ -291,13 +287,17 @@ def _measure_strain_left(axes, hose, step):
 
 
 @inlined
-def _measure_contact_left(axes, stage, fraction, contact, x, work):
-    """What a Newton step leaves of the contact's residual, N."""
-    h, X, _ = stage
-    for k in range(len(x)):
-        work.rate[k] = (x[k] - X[k]) / h
-    motion = Motion(work.rate, work.start, h, fraction * contact.law[TIMESTEP])
-    return measure_contact_left(axes, contact, x, motion)
+def _measure_left(axes, hose, stage, constraints, fraction, loads, x, work):
+    """What the step in work.step to x leaves of the forces, as part of their scale."""
+    left = _measure_strain_left(axes, hose, work.step)
+    contact = loads.contact
+    if contact.found[TOUCHED] > 0.0:
+        h, X, _ = stage
+        for k in range(len(x)):
+            work.rate[k] = (x[k] - X[k]) / h
+        motion = Motion(work.rate, work.start, h, fraction * contact.law[TIMESTEP])
+        left += measure_contact_left(axes, contact, x, motion)
+    return left / _measure_scale(hose, stage, constraints, loads, x, work)
 
 
 @inlined

@@ -1,0 +1,93 @@
+"""How well a simulation of a hose goes: `hose.health`, and the warnings that it gives."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from hose_mj.errors import HoseWarning, StepError
+
+MOST_FALLBACKS = 1.0  # a step; runs that were wrong had more, right ones below 0.3
+DEEPEST = 0.3  # radii; the default law sinks 0.2 at the tension that breaks a hose
+LEAST_STRETCH = 0.5  # |r'|; a hose in use is compressed by less, a fold by far more
+LARGEST_JUMP = 0.1  # of the length; what moves farther in a step throws the hose
+EVERY = 64  # steps between two looks at the share of fallbacks
+
+
+@dataclass(frozen=True)
+class Health:
+    """What went on since the last reset; see docs/physics.md for what each says."""
+
+    steps: int  # done
+    fallback_share: float  # solves that needed the careful iteration, a step
+    deepest_contact: float  # in radii of the hose; above 0 inside the surface
+    least_stretch: float  # |r'| now: 1 as long as at rest, near 0 folded
+    laid_strain: float  # the largest as `reset` laid it
+    largest_jump: float  # of a hold within a step (m)
+    warnings: tuple[str, ...]  # all that was said
+
+
+class HealthWatch:
+    """Gathers a hose's health and says what leaves its healthy range, each kind once.
+
+    Args:
+        length: of the hose (m).
+        strict: whether a warning is a `StepError` instead.
+    """
+
+    def __init__(self, length: float, strict: bool) -> None:
+        self._length, self._strict = length, strict
+        self.reset(0)
+
+    def reset(self, fallbacks: int) -> None:
+        """Begins anew; `fallbacks` is how many there were before."""
+        self._said: dict[str, str] = {}
+        self._fallbacks_before, self._looked = fallbacks, (0, fallbacks)
+        self.largest_jump = self.laid_strain = 0.0
+
+    def check_jump(self, jump: float) -> None:
+        """Looks at how far a hold goes within the step to come (m)."""
+        self.largest_jump = max(self.largest_jump, jump)
+        if jump > LARGEST_JUMP * self._length:
+            self._tell(
+                "jump",
+                f"a hold moves by {jump:.3g} m within one step, {jump / self._length:.0%} of the "
+                f"hose: move it by at most {LARGEST_JUMP * self._length:.3g} m a step",
+            )
+
+    def check_steps(self, steps: int, fallbacks: int, deepest: float) -> None:
+        """Looks at what was counted so far; `deepest` is in radii."""
+        if deepest > DEEPEST:
+            self._tell(
+                "contact",
+                f"a surface is {deepest:.2g} radii inside the hose: take shorter steps, or give "
+                "the contact law more stiffness",
+            )
+        before, known = self._looked
+        if steps - before >= EVERY:
+            self._looked = steps, fallbacks
+            share = (fallbacks - known) / (steps - before)
+            if share > MOST_FALLBACKS:
+                self._tell(
+                    "fallbacks",
+                    f"{share:.2g} solves a step needed the careful iteration: the motion is not "
+                    "resolved; take shorter steps, or more control points",
+                )
+
+    def report(
+        self, steps: int, fallbacks: int, deepest: float, measure_stretch: Callable[[], float]
+    ) -> Health:
+        """All of it."""
+        share = (fallbacks - self._fallbacks_before) / max(steps, 1)
+        said = tuple(self._said.values())
+        numbers = (measure_stretch(), self.laid_strain, self.largest_jump)
+        return Health(steps, share, deepest, *numbers, said)
+
+    def _tell(self, kind: str, text: str) -> None:
+        if kind in self._said:
+            return
+        self._said[kind] = text
+        if self._strict:
+            raise StepError(text)
+        warnings.warn(text, HoseWarning, stacklevel=4)

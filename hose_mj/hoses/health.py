@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from hose_mj.errors import HoseWarning, StepError
 
-MOST_FALLBACKS = 1.0  # a step; runs that were wrong had more, right ones below 0.3
+MOST_RETRIES = 0.5  # a step; impacts on thin walls take 0.3, free motions none
 DEEPEST = 0.3  # radii; the default law sinks 0.2 at the tension that breaks a hose
 LEAST_STRETCH = 0.5  # |r'|; a hose in use is compressed by less, a fold by far more
 LARGEST_JUMP = 0.1  # of the length; what moves farther in a step throws the hose
-EVERY = 64  # steps between two looks at the share of fallbacks
+EVERY = 64  # steps between two looks at the retries
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Health:
     """What went on since the last reset; see docs/physics.md for what each says."""
 
     steps: int  # done
-    fallback_share: float  # solves that needed the careful iteration, a step
+    retry_share: float  # how often a step had to be tried another way, of all steps
     deepest_contact: float  # in radii of the hose; above 0 inside the surface
     least_stretch: float  # |r'| now: 1 as long as at rest, near 0 folded
     laid_strain: float  # the largest as `reset` laid it
@@ -40,10 +40,10 @@ class HealthWatch:
         self._length, self._strict = length, strict
         self.reset(0)
 
-    def reset(self, fallbacks: int) -> None:
-        """Begins anew; `fallbacks` is how many there were before."""
+    def reset(self, retries: int) -> None:
+        """Begins anew; `retries` is how many there were before."""
         self._said: dict[str, str] = {}
-        self._fallbacks_before, self._looked = fallbacks, (0, fallbacks)
+        self._retries_before, self._looked = retries, (0, retries)
         self.largest_jump = self.laid_strain = 0.0
 
     def check_jump(self, jump: float) -> None:
@@ -56,7 +56,7 @@ class HealthWatch:
                 f"hose: move it by at most {LARGEST_JUMP * self._length:.3g} m a step",
             )
 
-    def check_steps(self, steps: int, fallbacks: int, deepest: float) -> None:
+    def check_steps(self, steps: int, retries: int, deepest: float) -> None:
         """Looks at what was counted so far; `deepest` is in radii."""
         if deepest > DEEPEST:
             self._tell(
@@ -66,20 +66,20 @@ class HealthWatch:
             )
         before, known = self._looked
         if steps - before >= EVERY:
-            self._looked = steps, fallbacks
-            share = (fallbacks - known) / (steps - before)
-            if share > MOST_FALLBACKS:
+            self._looked = steps, retries
+            share = (retries - known) / (steps - before)
+            if share > MOST_RETRIES:
                 self._tell(
-                    "fallbacks",
-                    f"{share:.2g} solves a step needed the careful iteration: the motion is not "
+                    "retries",
+                    f"steps were tried another way {share:.2g} times each: the motion is not "
                     "resolved; take shorter steps, or more control points",
                 )
 
     def report(
-        self, steps: int, fallbacks: int, deepest: float, measure_stretch: Callable[[], float]
+        self, steps: int, retries: int, deepest: float, measure_stretch: Callable[[], float]
     ) -> Health:
         """All of it."""
-        share = (fallbacks - self._fallbacks_before) / max(steps, 1)
+        share = (retries - self._retries_before) / max(steps, 1)
         said = tuple(self._said.values())
         numbers = (measure_stretch(), self.laid_strain, self.largest_jump)
         return Health(steps, share, deepest, *numbers, said)

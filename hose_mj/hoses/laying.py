@@ -6,8 +6,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.inputs import read_numbers
 from hose_mj.hoses.protocol import Array, Curve
 
+_VALID = "finite numbers, shape (k, 3), m"
 _CHORDS = 1024
 _EVEN = 1e-3
 """Of the mean pace: a function whose pace varies by less is taken as it is."""
@@ -26,10 +28,10 @@ def even_out(curve: Curve, length: float) -> Curve:
             2 times the hose's.
     """
     if not callable(curve):
-        return _read_points("curve", curve)
+        return read_numbers("curve", curve, _VALID)
     follow = curve
     at = np.linspace(0.0, length, _CHORDS + 1)
-    points = _read_points("curve(arc_lengths)", follow(at))
+    points = read_numbers("curve(arc_lengths)", follow(at), _VALID)
     if points.shape != (len(at), 3) or not np.all(np.isfinite(points)):
         return curve
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -46,10 +48,3 @@ def even_out(curve: Curve, length: float) -> Curve:
         return np.asarray(follow(np.clip(find_parameter(s), 0.0, length)), dtype=np.float64)
 
     return evenly
-
-
-def _read_points(name: str, points: object) -> Array:
-    try:
-        return np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(name, points, "an array of shape (k, 3), m") from None

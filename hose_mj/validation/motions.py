@@ -93,7 +93,7 @@ def make_suture_pull() -> Case:
     def lay(hose: HoseModel) -> list[Hold]:
         hose.reset(
             lambda s: np.stack(
-                [s / length * slack, 0.0 * s, -0.0125 * np.sin(math.pi * s / length)], axis=1
+                [s / length * slack, 0.0 * s, -0.0089 * np.sin(math.pi * s / length)], axis=1
             )
         )
         ends = [hose.attach(0.0, (0.0, 0.0, 0.0)), hose.attach(length, (slack, 0.0, 0.0))]

@@ -37,7 +37,7 @@ def relax_initial_shape(
 
     Between neighbours it starts as an arc of a circle or as waves to the side, or hanging: the
     first of these that is clear of obstacles and does not cross what is there of the hose. Then it
-    moves through a viscous medium until it has found its place. All hose models start from this
+    moves through a viscous medium, without friction, until it has found its place. All hose models start from this
     shape.
 
     Args:
@@ -54,7 +54,7 @@ def relax_initial_shape(
         timestep=_STEP,
         gravity=gravity,
         control_points=n,
-        obstacles=obstacles,
+        obstacles=[replace(one, friction=0.0) for one in obstacles],
         scheme="backward-euler",
     )
     with warnings.catch_warnings():

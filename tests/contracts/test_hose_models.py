@@ -466,11 +466,11 @@ def test_a_snapshot_of_which_a_part_is_missing_or_odd_changes_nothing(hose):
     before = observe(hose)
     for name in hose.snapshot():
         for odd in (None, "text", {"a": 1}):
-            with pytest.raises(InputError, match="state"):
+            with pytest.raises(InputError, match="snapshot"):
                 hose.restore(hose.snapshot() | {name: odd})
         state = hose.snapshot()
         del state[name]
-        with pytest.raises(InputError, match="state"):
+        with pytest.raises(InputError, match="snapshot"):
             hose.restore(state)
     np.testing.assert_array_equal(observe(hose), before)
 

@@ -68,7 +68,7 @@ class Dynamics:
         scheme: the integrator's name.
         timestep: length of a step (s).
         state: what a step changes.
-        counts: steps since the last reset, Newton iterations and fallbacks so far, (3,).
+        counts: see `integrators.STEPS`; the steps are those since the last reset, (4,).
         trial: the state after a step that was tried; see body_coupling.py.
     """
 

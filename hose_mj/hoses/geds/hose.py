@@ -20,7 +20,7 @@ from hose_mj.hoses.geds.body import FOLDED, SplineBody
 from hose_mj.hoses.geds.body_coupling import BodyCoupling
 from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
-from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
+from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.material_frames import check_rotation
 from hose_mj.hoses.geds.spline import Spline
@@ -123,7 +123,7 @@ class GedsHose(SplineBody):
         )
         self.contacts = ContactSet(spline, spec, move, float(timestep), self._state, scheme)
         self._loads = LoadSet(spline, self._weight, self.contacts)
-        self._counts = np.zeros(3, dtype=np.int64)
+        self._counts = np.zeros(4, dtype=np.int64)
         self._dynamics = Dynamics(
             *(self._axes, self._hose, self._constraints, self._loads, limits),
             *(scheme, float(timestep), self._state, self._counts),
@@ -214,6 +214,7 @@ class GedsHose(SplineBody):
             "contacts": self.contacts.snapshot(),
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
+            "retries": int(self._counts[RETRIES]),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -236,7 +237,8 @@ class GedsHose(SplineBody):
         shapes = {name: part.shape for name, part in self._state._asdict().items()}
         read = {name: take_array(parts, name, shape) for name, shape in shapes.items()}
         offset = take_array(state, "offset", (3,))
-        counts = [take_count(state, name) for name in ("steps", "iterations", "fallbacks")]
+        names = ("steps", "iterations", "fallbacks", "retries")
+        counts = [take_count(state, name) for name in names]
         self._set_state(integrators.State(**read))
         self._spline.offset = offset
         self._counts[:] = counts
@@ -400,15 +402,15 @@ class GedsHose(SplineBody):
         if self._constraints.is_moved:
             self._watch.check_jump(self._constraints.measure_jump())
         self._dynamics.advance(int(n_steps))
-        steps, _, fallbacks = self._counts.tolist()
-        self._watch.check_steps(steps, fallbacks, self.contacts.deepest)
+        steps, _, _, retries = self._counts.tolist()
+        self._watch.check_steps(steps, retries, self.contacts.deepest)
 
     @property
     def health(self) -> Health:
         """How well it went since the last reset."""
-        steps, _, fallbacks = self._counts.tolist()
+        steps, _, _, retries = self._counts.tolist()
         deepest = self.contacts.deepest
-        return self._watch.report(steps, fallbacks, deepest, self.measure_least_stretch)
+        return self._watch.report(steps, retries, deepest, self.measure_least_stretch)
 
     def solve_static(self, load_steps: int = 1) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.
@@ -491,7 +493,7 @@ class GedsHose(SplineBody):
 
     def _start(self, director: Array | None = None) -> None:
         self._counts[STEPS] = 0
-        self._watch.reset(self.fallbacks)
+        self._watch.reset(int(self._counts[RETRIES]))
         self.contacts.set_closed(False)
         self.contacts.forget()
         self._loads.clear()

@@ -52,8 +52,9 @@ class State(NamedTuple):
     started: Array
 
 
-STEPS, ITERATIONS, FALLBACKS = range(3)
-"""Places in the counters, (3,): steps done, Newton iterations, solver fallbacks."""
+STEPS, ITERATIONS, FALLBACKS, RETRIES = range(4)
+"""Places in the counters, (4,): steps done, Newton iterations, solver fallbacks, and how often a
+step had to be tried another way."""
 
 
 def make_state(size: int) -> State:
@@ -253,6 +254,7 @@ def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, wo
             state.started[0] = 1.0 if first else 0.0
             return verdict
         counts[FALLBACKS] += 1
+        counts[RETRIES] += 1
     return verdict
 
 

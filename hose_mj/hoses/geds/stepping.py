@@ -37,7 +37,7 @@ class Session(NamedTuple):
         timestep: dt (s).
         state: what steps change.
         trial: the state after a step that was tried.
-        counts: steps done, Newton iterations, fallbacks, (3,).
+        counts: see `integrators.STEPS`, (4,).
         masses: at its attachments; none but where bodies are stepped with it.
         first: first rows of the masses' constraints, (k,).
         work: work arrays.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hose_mj.hoses.geds import contact, mechanics, shapes
+from hose_mj.hoses.geds import contact, contact_law, mechanics, shapes
 from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.integrators import make_state
 from hose_mj.hoses.geds.spline import Spline
@@ -36,7 +36,7 @@ OBSTACLES = {
 
 def make(obstacles, plane=None, **law):
     spline = Spline(N, SPEC.length, plane)
-    contacts = ContactSet(spline, SPEC, np.zeros(3), 0.005, make_state(spline.size))
+    contacts = ContactSet(spline, SPEC, 1e-6, STEP, make_state(spline.size))
     contacts.set_obstacles(obstacles, ContactLaw(stiffness=1e3, width=0.01, **law))
     return spline, contacts
 
@@ -49,14 +49,21 @@ def draw_state(spline, rng):
     return points[:, spline.dims].ravel(), rng.normal(size=N * spline.dimension)
 
 
-def add(spline, contacts, x, rate, base, step, exact):
-    """Gradient (n d,), dense matrix and the number of touching points."""
+def add(spline, contacts, x, rate, start, step, exact):
+    """Gradient (n d,), dense matrix and the number of touching points, in a stage of its own."""
     size, width = len(x), 4 * spline.dimension
     gradient, band = np.zeros(size + width), np.zeros((size + width, 2 * width))
-    touching = contact.add_contact(
-        spline.axes, contacts.contact, x, rate, base, step, exact, gradient, band
-    )
+    contacts.contact.found[contact_law.STAGE] += 1
+    motion = contact_law.Motion(rate, start, step, STEP)
+    touching = contact.add_contact(spline.axes, contacts.contact, x, motion, exact, gradient, band)
     return gradient[:size], mechanics.make_dense(band, size, width), touching
+
+
+def accept(spline, contacts, x, rate, start):
+    """Ends a step from `start` at x: what was found is remembered."""
+    state = contacts._state
+    state.x[:], state.v[:], state.x_old[:] = x, rate, start
+    contact.accept_contact(spline.axes, contacts.contact, state)
 
 
 def compute_energy(spline, contacts, x):
@@ -79,15 +86,15 @@ def test_matrix_is_the_derivative_of_the_normal_force(kind, plane):
     spline, contacts = make([OBSTACLES[kind]], plane, damping_time=0.0)
     x, _ = draw_state(spline, rng)
     still = np.zeros_like(x)
-    gradient, matrix, touching = add(spline, contacts, x, still, still, np.inf, True)
+    gradient, matrix, touching = add(spline, contacts, x, still, x, np.inf, True)
     assert touching > 2
     assert np.max(np.abs(gradient)) > 0.1
     step, columns, slopes = 1e-7, [], []
     for k in range(len(x)):
         move = np.zeros_like(x)
         move[k] = step
-        there = add(spline, contacts, x + move, still, still, np.inf, True)[0]
-        back = add(spline, contacts, x - move, still, still, np.inf, True)[0]
+        there = add(spline, contacts, x + move, still, x, np.inf, True)[0]
+        back = add(spline, contacts, x - move, still, x, np.inf, True)[0]
         columns.append((there - back) / (2 * step))
         rise = compute_energy(spline, contacts, x + move) - compute_energy(
             spline, contacts, x - move
@@ -97,26 +104,28 @@ def test_matrix_is_the_derivative_of_the_normal_force(kind, plane):
     np.testing.assert_allclose(matrix, np.array(columns).T, atol=1e-5 * np.max(np.abs(matrix)))
 
 
+@pytest.mark.parametrize("stick", [1e-2, 1e3, 1e7])
 @pytest.mark.parametrize("plane", [None, "xy"])
-def test_matrix_is_the_derivative_of_sliding_friction(plane):
-    # On a floor that a hose slides along, N does not change: the derivative is friction's alone.
+def test_matrix_is_the_derivative_of_friction(plane, stick):
+    # On a floor that a hose moves along, N does not change: the derivative is friction's alone.
     rng = np.random.default_rng(5)
-    spline, contacts = make([OBSTACLES["plane"]], plane, damping_time=0.0, slip_speed=0.3)
-    x, rate = draw_state(spline, rng)
+    spline, contacts = make([OBSTACLES["plane"]], plane, damping_time=0.0, stick_stiffness=stick)
+    x, way = draw_state(spline, rng)
     if plane is None:
-        x[2::3], rate[2::3] = -0.02, 0.0
+        x[2::3], way[2::3] = -0.02, 0.0
     else:
         spline.offset[2] = -0.02
         contacts.set_closed(False)  # reads the offset anew
-    _, matrix, touching = add(spline, contacts, x, rate, rate, STEP, False)
+    start, still = x - 1e-3 * way, np.zeros_like(x)
+    _, matrix, touching = add(spline, contacts, x, still, start, STEP, False)
     assert touching == len(contacts.arc_lengths)
-    d, step = spline.dimension, 1e-6
+    d, step = spline.dimension, 1e-8
     along = [k for k in range(len(x)) if k % d < 2]
     for k in along:
         move = np.zeros_like(x)
         move[k] = step
-        there = add(spline, contacts, x, rate + move / STEP, rate, STEP, False)[0]
-        back = add(spline, contacts, x, rate - move / STEP, rate, STEP, False)[0]
+        there = add(spline, contacts, x + move, still, start, STEP, False)[0]
+        back = add(spline, contacts, x - move, still, start, STEP, False)[0]
         wanted = (there - back) / (2 * step)
         np.testing.assert_allclose(
             matrix[along, k], wanted[along], atol=1e-5 * np.max(np.abs(matrix))
@@ -129,14 +138,14 @@ def test_damping_closes_the_matrix_too():
     spline, contacts = make([floor], damping_time=0.02)
     x, rate = draw_state(spline, rng)
     # Below -width the law is linear in place and speed: the matrix is exact.
-    _, matrix, touching = add(spline, contacts, x, rate, rate, STEP, False)
+    _, matrix, touching = add(spline, contacts, x, rate, x, STEP, False)
     assert touching == len(contacts.arc_lengths)
     step = 1e-6
     for k in range(0, len(x), 5):
         move = np.zeros_like(x)
         move[k] = step
-        there = add(spline, contacts, x + move, rate + move / STEP, rate, STEP, False)[0]
-        back = add(spline, contacts, x - move, rate - move / STEP, rate, STEP, False)[0]
+        there = add(spline, contacts, x + move, rate + move / STEP, x, STEP, False)[0]
+        back = add(spline, contacts, x - move, rate - move / STEP, x, STEP, False)[0]
         wanted = (there - back) / (2 * step)
         np.testing.assert_allclose(matrix[:, k], wanted, atol=1e-6 * np.max(np.abs(matrix)))
 
@@ -147,8 +156,8 @@ def test_matrix_without_curvature_is_positive_semidefinite(plane):
     spline, contacts = make(list(OBSTACLES.values()), plane)
     for _ in range(50):
         x, rate = draw_state(spline, rng)
-        base = rng.normal(size=len(x)) * 10.0 ** rng.uniform(-4, 1)
-        _, matrix, touching = add(spline, contacts, x, rate, base, STEP, False)
+        start = x + rng.normal(size=len(x)) * 10.0 ** rng.uniform(-9, -1)
+        _, matrix, touching = add(spline, contacts, x, rate, start, STEP, False)
         assert touching > 0
         values = np.linalg.eigvalsh(matrix)
         assert values[0] > -1e-9 * values[-1]
@@ -160,8 +169,8 @@ def test_nothing_rubs_in_statics():
     moving, belt = make([Obstacle(kind="plane", position=(0, 0, -0.03), velocity=(1.0, 0, 0))])
     x, _ = draw_state(spline, rng)
     still = np.zeros_like(x)
-    one = add(spline, contacts, x, still, still, np.inf, True)[0]
-    other = add(moving, belt, x, still, still, np.inf, True)[0]
+    one = add(spline, contacts, x, still, x, np.inf, True)[0]
+    other = add(moving, belt, x, still, x, np.inf, True)[0]
     np.testing.assert_array_equal(one, other)
     assert np.all(one[0::3] == 0.0)
     assert np.any(one[2::3] != 0.0)
@@ -189,9 +198,10 @@ def test_reactions_are_opposite_to_what_the_hose_feels(plane):
     ]
     spline, contacts = make(obstacles, plane)
     x, rate = draw_state(spline, rng)
-    gradient, _, touching = add(spline, contacts, x, rate, rate, STEP, False)
+    start = x - 1e-3 * rng.normal(size=len(x))
+    gradient, _, touching = add(spline, contacts, x, rate, start, STEP, False)
     assert touching > 3
-    contacts._state.x[:], contacts._state.v[:] = x, rate
+    accept(spline, contacts, x, rate, start)
     reactions = contacts.compute_reactions()
     on_obstacles = reactions[:, :3].sum(axis=0)
     on_points = spline.to_world(-gradient)
@@ -218,12 +228,12 @@ def test_surface_velocity_is_that_of_a_rigid_body():
     ball = Obstacle(
         kind="sphere", position=(0.5, 0.0, -0.2), size=0.2, angular_velocity=(0.0, 3.0, 0.0)
     )
-    _, contacts = make([ball])
+    spline, contacts = make([ball], stick_stiffness=1e6)
     x = np.zeros((N, 3))
     x[:, 0] = np.linspace(0.0, 1.0, N)
-    contacts._state.x[:] = x.ravel()
+    accept(spline, contacts, x.ravel(), 0.0 * x.ravel(), x.ravel())
     force = contacts.compute_forces().sum(axis=0)
-    # omega x arm = (0, 3, 0) x (0, 0, .2) = (.6, 0, 0), far above the slip speed.
+    # omega x arm = (0, 3, 0) x (0, 0, .2) = (.6, 0, 0), far above what it could stick to.
     assert force[0] == pytest.approx(0.5 * force[2], rel=0.05)
     assert force[1] == pytest.approx(0.0, abs=1e-12)
 
@@ -232,7 +242,8 @@ def test_a_fourth_unknown_is_left_alone():
     rng = np.random.default_rng(12)
     spline, contacts = make(list(OBSTACLES.values()))
     x, rate = draw_state(spline, rng)
-    gradient, matrix, touching = add(spline, contacts, x, rate, rate, STEP, True)
+    start = x - 1e-3 * rate
+    gradient, matrix, touching = add(spline, contacts, x, rate, start, STEP, True)
 
     def widen(flat):
         """The same with a turn of the section behind each control point's coordinates."""
@@ -240,7 +251,9 @@ def test_a_fourth_unknown_is_left_alone():
 
     axes, size = (0.0,) * 4, 4 * N
     wide, band = np.zeros(size + 16), np.zeros((size + 16, 32))
-    arguments = (contacts.contact, widen(x), widen(rate), widen(rate), STEP, True)
+    contacts.contact.found[contact_law.STAGE] += 1
+    motion = contact_law.Motion(widen(rate), widen(start), STEP, STEP)
+    arguments = (contacts.contact, widen(x), motion, True)
     assert contact.add_contact(axes, *arguments, wide, band) == touching > 0
     places = np.arange(size).reshape(N, 4)
     space, turn = places[:, :3].ravel(), places[:, 3]

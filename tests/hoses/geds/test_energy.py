@@ -31,7 +31,7 @@ def make_elasticity(*, strain=0.0, curvature=0.0, damping=0.0, ea=50.0, ei=0.05,
 def make_constants(elasticity, tables=TABLES):
     n = len(tables.first) + 3
     mass = basis.make_mass(basis.make_knots(n, LENGTH), np.full((n - 3, 4), 0.1))
-    return records.Hose(tables, elasticity, mass, 1e-4, 0.0)
+    return records.Hose(tables, elasticity, mass, 1e-4, 0.0, 0.1)
 
 
 def make_no_twist(hose, d):

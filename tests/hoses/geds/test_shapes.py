@@ -30,7 +30,7 @@ def make_obstacle(kind, rng):
 def make_row(obstacle):
     spec = HoseSpec(length=1.0, axial_stiffness=1.0, bending_stiffness=1.0, linear_density=1.0)
     state = make_state(15)
-    contacts = ContactSet(Spline(5, 1.0, None), spec, np.zeros(3), 0.005, state)
+    contacts = ContactSet(Spline(5, 1.0, None), spec, 1e-4, 0.005, state)
     contacts.set_obstacles([obstacle], ContactLaw())
     return contacts.contact.geoms
 
@@ -146,6 +146,7 @@ def test_a_wrong_obstacle_is_refused(options, thing):
         {"width": -1.0},
         {"damping_time": -1.0},
         {"slip_speed": 0.0},
+        {"stick_stiffness": 0.0},
         {"points_per_span": 0},
     ],
 )

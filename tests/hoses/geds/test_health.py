@@ -1,0 +1,115 @@
+"""Newton stops on forces, and `hose.health` says what leaves its healthy range."""
+
+import numpy as np
+import pytest
+
+from hose_mj import HoseSpec, HoseWarning, StepError, make_hose
+from hose_mj.hoses.health import DEEPEST, LARGEST_JUMP
+from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+
+WIRE = HoseSpec(
+    length=3.0,
+    axial_stiffness=3.3e5,
+    bending_stiffness=1.23e-3,
+    torsional_stiffness=9.48e-4,
+    linear_density=0.0149,
+    outer_radius=0.001,
+    damping_time=0.002,
+)
+
+
+def carry_slack_wire(n, dt, duration=1.0, **options):
+    """Forces on a robot that carries the end of a slack wire rope, every 10 ms, (k, 3)."""
+    hose = make_hose("geds", WIRE, timestep=dt, control_points=n, **options)
+    hose.reset([[0, 0, 0], [0.9, 0, -1.2], [1.8, 0, 0]])
+    hose.attach(0.0, (0, 0, 0))
+    robot = hose.attach(3.0, (1.8, 0, 0))
+    hose.solve_static()
+    forces, every = [], round(0.01 / dt)
+    for k in range(round(duration / dt)):
+        t = (k + 1) * dt
+        grow = 0.3 * min(1.0, t)
+        hose.move(robot, (1.8 + grow * np.sin(np.pi * t), 0.7 * grow * (1 - np.cos(np.pi * t)), 0))
+        hose.step()
+        if k % every == every - 1:
+            forces.append(hose.reaction(robot).force)
+    return np.array(forces)
+
+
+@pytest.mark.parametrize(("n", "dt"), [(16, 0.005), (64, 0.002)])
+@pytest.mark.filterwarnings("ignore:the hose is laid:hose_mj.HoseWarning")
+def test_forces_are_right_at_the_default_tolerance(n, dt):
+    found = carry_slack_wire(n, dt)
+    tight = carry_slack_wire(n, dt, tolerance=1e-9, force_tolerance=1e-8)
+    size = np.sqrt((tight**2).sum(1).mean())
+    assert np.sqrt(((found - tight) ** 2).sum(1).mean()) < 0.01 * size
+
+
+@pytest.mark.parametrize(
+    ("axial", "bending", "n", "dt"),
+    [(2e5, 1e-3, 32, 0.005), (2e5, 1e-3, 64, 0.002), (1e6, 1e-3, 64, 0.005), (1e7, 0.05, 32, 0.01)],
+)
+def test_a_free_swing_gains_no_energy(axial, bending, n, dt):
+    spec = HoseSpec(
+        length=1.0, axial_stiffness=axial, bending_stiffness=bending, linear_density=0.1
+    )
+    hose = make_hose("geds", spec, timestep=dt, control_points=n)
+    hose.reset([[0, 0, 0], [1, 0, 0]])
+    hose.clamp(0.0)
+    start = hose.energies().total
+    for _ in range(round(2.0 / dt / 5)):
+        hose.step(5)
+        assert hose.energies().total - start < 1e-3 * spec.mass * 9.81
+
+
+@pytest.fixture
+def hose(request):
+    spec = HoseSpec(length=1.0, axial_stiffness=2e4, bending_stiffness=0.01, linear_density=0.1)
+    made = make_hose("geds", spec, strict=getattr(request, "param", False))
+    made.reset([[0, 0, 0], [1, 0, 0]])
+    return made
+
+
+@pytest.mark.parametrize("part", [1.5, 10.0])
+def test_a_hold_that_jumps_is_said_once(hose, part):
+    hold = hose.attach(1.0)
+    hose.move(hold, (1.0, 0.9 * LARGEST_JUMP, 0.0))
+    hose.step()
+    assert hose.health.warnings == ()
+    hose.move(hold, (1.0, 0.9 * LARGEST_JUMP + part * LARGEST_JUMP, 0.0))
+    with pytest.warns(HoseWarning, match="moves by .* within one step"):
+        hose.step()
+    hose.move(hold, (1.0, 0.0, 0.0))
+    hose.step()
+    assert len(hose.health.warnings) == 1
+    assert hose.health.largest_jump >= part * LARGEST_JUMP
+    hose.reset([[0, 0, 0], [1, 0, 0]])
+    assert hose.health.warnings == ()
+
+
+@pytest.mark.parametrize("hose", [True], indirect=True)
+def test_strict_refuses_the_step(hose):
+    hold = hose.attach(1.0)
+    hose.step()
+    before = hose.control_points
+    hose.move(hold, (1.0, 3.0, 0.0))
+    with pytest.raises(StepError, match="moves by 3 m"):
+        hose.step()
+    np.testing.assert_array_equal(hose.control_points, before)
+
+
+def test_where_a_hold_begins_in_statics_is_no_jump(hose):
+    hose.attach(0.0)
+    hose.attach(1.0, (0.5, 0.0, 0.0))
+    hose.solve_static()
+    hose.step()
+    assert hose.health.warnings == ()
+    assert hose.health.retry_share == 0.0
+
+
+def test_a_deep_contact_is_said(hose):
+    floor = Obstacle(kind="plane", position=(0, 0, -0.1))
+    hose.set_obstacles([floor], ContactLaw(stiffness=30.0))
+    with pytest.warns(HoseWarning, match="radii inside"):
+        hose.step(60)
+    assert hose.health.deepest_contact > DEEPEST

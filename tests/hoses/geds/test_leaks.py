@@ -1,0 +1,134 @@
+"""Nothing thicker than the hose's radius is passed at default settings, and friction holds."""
+
+import numpy as np
+import pytest
+
+from hose_mj import HoseSpec, Obstacle, make_hose
+
+RADIUS = 0.01
+
+
+def make(length=1.0, **options):
+    spec = HoseSpec(
+        length=length,
+        axial_stiffness=2e4,
+        bending_stiffness=0.005,
+        linear_density=0.1,
+        outer_radius=RADIUS,
+        damping_time=0.005,
+        drag=0.1,
+    )
+    return make_hose("geds", spec, **options)
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.005])
+@pytest.mark.parametrize("force", [20.0, 200.0])
+@pytest.mark.parametrize("post", [0.005, 0.03, 0.1])
+def test_a_taut_hose_stays_outside_a_round_post(post, force, dt):
+    obstacle = Obstacle(kind="cylinder", size=(post, 1.0), friction=0.3)
+    hose = make(timestep=dt, gravity=(0, 0, 0), obstacles=[obstacle])
+    y = post + RADIUS
+    hose.reset([[-0.5, y, 0], [0.5, y, 0]])
+    n_steps = round(0.6 / dt)
+    for k in range(n_steps):
+        now = force * min(1.0, 2 * (k + 1) / n_steps) / np.sqrt(2)
+        hose.clear_loads()
+        hose.apply_force(1.0, (now, -now, 0))
+        hose.apply_force(0.0, (-now, -now, 0))
+        hose.step()
+    places = hose.position(np.linspace(0, 1, 1001))
+    assert hose.position(0.5)[0, 1] > 0
+    far = np.hypot(places[:, 0], places[:, 1])
+    assert (post + RADIUS - far.min()) / RADIUS < 0.2
+    assert hose.iterations < 6 * n_steps
+
+
+@pytest.mark.parametrize("half", [0.01, 0.02, 0.05])
+@pytest.mark.parametrize("length", [1.0, 3.0])
+def test_no_bar_is_fallen_through(length, half):
+    rng = np.random.default_rng(3)
+    for _ in range(6):
+        place = rng.uniform(0.3, 0.7) * length
+        bar = Obstacle(kind="box", position=(place, 0, 0), size=(half, 0.5, 0.02))
+        hose = make(length, timestep=0.005, obstacles=[bar])
+        hose.reset([[0, 0, 0.06], [length, 0, 0.06]])
+        hose.step(50)
+        assert hose.position(place)[0, 2] > 0.0
+
+
+@pytest.mark.parametrize("speed", [5.0, 20.0, 50.0])
+def test_a_thin_wall_stops_whatever_hits_it(speed):
+    rng = np.random.default_rng(4)
+    for _ in range(8):
+        wall = Obstacle(kind="box", size=(0.0025, 1.0, 1.0), friction=0.3)
+        hose = make(timestep=0.005, gravity=(0, 0, 0), obstacles=[wall])
+        turn = rng.uniform(-1.0, 1.0)
+        away = -0.55 - rng.uniform(0.0, 0.3)
+        along = 0.5 * np.array([np.cos(turn), np.sin(turn), 0.0])
+        middle = np.array([away, 0.0, 0.0])
+        hose.reset([middle - along, middle + along], (speed, 0.0, 0.0))
+        start = hose.energies().kinetic
+        hose.step(round(1.5 / speed / 0.005) + 20)
+        assert hose.position(np.linspace(0, 1, 201))[:, 0].max() < 0.0
+        assert hose.energies().total < 1.02 * start
+
+
+@pytest.mark.parametrize("n", [16, 32])
+def test_the_tip_stands_on_the_floor(n):
+    spec = HoseSpec(length=1.0, axial_stiffness=2e4, bending_stiffness=0.5, linear_density=0.1)
+    floor = Obstacle(kind="plane", friction=0.5)
+    hose = make_hose("geds", spec, timestep=2e-3, control_points=n, obstacles=[floor])
+    hose.reset([[0.02, 0, 1.05], [0, 0, 0.05]])
+    hold = hose.attach(0.0, (0.02, 0, 1.05))
+    for k in range(500):
+        hose.move(hold, (0.02, 0, 1.05 - 0.15 * (k + 1) / 500))
+        hose.step()
+        assert hose.position(np.linspace(0.9, 1, 21))[:, 2].min() > 0.7 * RADIUS
+
+
+def test_a_cord_on_a_drum_holds_what_it_was_drawn_to():
+    drum, r, tail = 0.1, 0.005, 0.25
+    middle = drum + r
+    length = 2 * tail + np.pi * middle
+
+    def lay(s):
+        angle = np.clip((s - tail) / middle, 0, np.pi)
+        end = np.where(angle >= np.pi, s - tail - np.pi * middle, 0.0)
+        below = np.where(s < tail, tail - s, end)
+        return np.stack([middle * np.cos(angle), middle * np.sin(angle) - below, 0 * s], 1)
+
+    spec = HoseSpec(
+        length=length,
+        axial_stiffness=2e3,
+        bending_stiffness=1e-6,
+        linear_density=0.02,
+        outer_radius=r,
+        damping_time=0.005,
+        drag=0.05,
+    )
+    obstacle = Obstacle(kind="cylinder", size=(drum, 1.0), friction=0.5)
+    options = {"gravity": (0, 0, 0), "control_points": 48, "obstacles": [obstacle]}
+    hose = make_hose("geds", spec, timestep=0.002, **options)
+    hose.reset(lay)
+    hose.apply_force(0.0, (0, -1.0, 0))
+    hold = hose.attach(length)
+    place = hose.position(length)[0]
+    for k in range(500):
+        place = place - np.array([0, 0.02 * 0.002 * min(1, k / 100), 0])
+        hose.move(hold, place)
+        hose.step()
+    hose.step(50)
+    drawn = -hose.reaction(hold).force[1]
+    assert drawn == pytest.approx(np.exp(0.5 * np.pi), rel=0.03)
+    hose.step(500)
+    assert -hose.reaction(hold).force[1] == pytest.approx(drawn, rel=1e-3)
+
+
+def test_a_turntable_carries_a_hose_round():
+    table = Obstacle(kind="plane", friction=0.5, angular_velocity=(0.0, 0.0, 1.0))
+    hose = make(timestep=0.002, obstacles=[table])
+    hose.reset([[0.1, 0, RADIUS], [1.1, 0, RADIUS]], lambda s: np.stack([0 * s, 0.1 + s, 0 * s], 1))
+    hose.step(round(np.pi / 0.002))
+    ends = hose.position([0.0, 1.0])
+    # 1 rad/s asks for .11 g at the outer end: friction holds that.
+    np.testing.assert_allclose(ends[:, :2], [[-0.1, 0.0], [-1.1, 0.0]], atol=5e-3)

@@ -37,8 +37,8 @@ def relax_initial_shape(
 
     Between neighbours it starts as an arc of a circle or as waves to the side, or hanging: the
     first of these that is clear of obstacles and does not cross what is there of the hose. Then it
-    moves through a viscous medium, without friction, until it has found its place. All hose models start from this
-    shape.
+    moves through a viscous medium, without friction, until it has found its place. All hose
+    models start from this shape.
 
     Args:
         spec: the hose.

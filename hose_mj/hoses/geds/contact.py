@@ -146,7 +146,7 @@ def add_contact(axes, contact, x, motion, exact, gradient, band):
     first = -1 if contact.given.shape[0] > 0 else 0
     for e in range(len(contact.first) - 1):
         start, n_before = e * len(axes), n_contacts
-        ball = find_span(axes, contact, e, x, motion.start)
+        ball = find_span(axes, contact, e, x, motion.before)
         is_fast = motion.step < np.inf and ball[2] > _FAST * law[RADIUS]
         for g in range(first, contact.geoms.shape[0]):
             if not is_span_near(contact, g, ball):
@@ -266,7 +266,7 @@ def measure_contact_left(axes, contact, x, motion):
         start = e * len(axes)
         moved = 0.0
         now = evaluate(axes, contact.points, q, start, x)
-        before = evaluate(axes, contact.points, q, start, motion.start)
+        before = evaluate(axes, contact.points, q, start, motion.before)
         for c in range(3):
             moved = max(moved, abs(now[c] - before[c]))
         is_fast = moved > 0.5 * _FAST * contact.law[RADIUS]
@@ -285,7 +285,7 @@ def measure_contact_left(axes, contact, x, motion):
 def accept_contact(axes, contact, state):
     """Makes friction remember a step that is done; counts impacts and keeps the greatest depth."""
     law, found = contact.law, contact.found
-    motion = Motion(state.v, state.x_old, law[TIMESTEP], law[TIMESTEP])
+    motion = Motion(state.v, state.x_old, state.x_old, law[TIMESTEP], law[TIMESTEP])
     found[IMPACTS] = 0.0
     first = -1 if contact.given.shape[0] > 0 else 0
     for e in range(len(contact.first) - 1):
@@ -356,7 +356,7 @@ def compute_forces(axes, contact, x, v, forces, reactions):
     hose's centre line. In the hose's coordinates.
     """
     # Nothing moves any more: friction is what it remembers.
-    motion = Motion(v, x, contact.law[TIMESTEP], 0.0)
+    motion = Motion(v, x, x, contact.law[TIMESTEP], 0.0)
     first = -1 if contact.given.shape[0] > 0 else 0
     forces[:, :] = 0.0
     reactions[:, :] = 0.0

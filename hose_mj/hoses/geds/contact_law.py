@@ -97,12 +97,14 @@ class Motion(NamedTuple):
     Attributes:
         rate: velocity of the control points, flat (n d,).
         start: control points at the beginning of the step, flat.
+        before: the same of the part of the step that is being taken, for sweeps.
         step: length of the stage (s), for damping; infinite in statics, where nothing rubs.
         elapsed: since the beginning of the step (s).
     """
 
     rate: Array
     start: Array
+    before: Array
     step: float
     elapsed: float
 

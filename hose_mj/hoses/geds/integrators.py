@@ -210,15 +210,11 @@ def start_step(axes, constraints, dt):
 def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
     """One step; where its Newton fails, backward Euler, in the end in ever finer parts."""
     # A line search takes more, shorter steps: three times as many may be needed.
-    careful = Limits(
-        limits.tolerance,
-        limits.turn_length,
-        3 * limits.max_iterations,
-        np.inf,
-        True,
-        0.0,
-        limits.force_tolerance,
-    )
+    most = 3 * limits.max_iterations
+    move, turn, left = limits.tolerance, limits.turn_length, limits.force_tolerance
+    careful = Limits(move, turn, most, np.inf, True, 0.0, left)
+    # What nothing else ends is taken in small parts by moves alone.
+    last = Limits(move, turn, most, np.inf, True, 0.0, np.inf)
     verdict = NOT_FINITE
     for attempt in range(ATTEMPTS):
         first = attempt == 0
@@ -234,7 +230,7 @@ def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, wo
             hose,
             constraints,
             loads,
-            limits if attempt < 2 else careful,
+            limits if attempt < 2 else (careful if attempt < 4 else last),
             use,
             dt,
             parts,

@@ -154,7 +154,7 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
     contact.found[TOUCHED] = 0.0
     if contact.geoms.shape[0] + contact.given.shape[0] > 0:
-        motion = Motion(work.rate, work.start, h, progress * contact.law[TIMESTEP])
+        motion = Motion(work.rate, work.start, work.x_now, h, progress * contact.law[TIMESTEP])
         add_contact(axes, contact, x, motion, exact, work.gradient, work.band)
 
 
@@ -295,7 +295,7 @@ def _measure_left(axes, hose, stage, constraints, fraction, loads, x, work):
         h, X, _ = stage
         for k in range(len(x)):
             work.rate[k] = (x[k] - X[k]) / h
-        motion = Motion(work.rate, work.start, h, fraction * contact.law[TIMESTEP])
+        motion = Motion(work.rate, work.start, work.x_now, h, fraction * contact.law[TIMESTEP])
         left += measure_contact_left(axes, contact, x, motion)
     return left / _measure_scale(hose, stage, constraints, loads, x, work)
 

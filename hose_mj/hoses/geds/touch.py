@@ -156,10 +156,11 @@ def compute_gap(axes, contact, q, g, start, x, motion, is_fast):
     distance, normal, bend, axis = measure(contact.geoms, g, point)
     gap, curvature = distance - contact.law[RADIUS], (bend, axis)
     if is_fast:
-        before = evaluate(axes, contact.points, q, start, motion.start)
-        gap, normal, curvature = _sweep(
-            contact, q, g, before, point, motion.elapsed, (gap, normal, curvature)
-        )
+        before = evaluate(axes, contact.points, q, start, motion.before)
+        # Since then no more has gone by: one and a half stages of BDF2 make a step.
+        elapsed = min(motion.elapsed, 1.5 * motion.step)
+        here = gap, normal, curvature
+        gap, normal, curvature = _sweep(contact, q, g, before, point, elapsed, here)
     return gap, normal, curvature, contact.geoms[g, FRICTION], point
 
 

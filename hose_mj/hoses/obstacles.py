@@ -81,10 +81,10 @@ class ContactLaw:
     """How a hose and an obstacle push each other; None for a value chosen from the hose.
 
     With g the gap between the surfaces, w the width and k the stiffness, the normal force per
-    length is 0 above g = w, k (w - g)^2 / (4 w) between w and -w, and -k g below: its slope is
-    continuous. The default law hardens from a tenth of the radius on. Friction holds what does not
-    slide by a spring of `stick_stiffness` along the surface; from friction times the normal force
-    on it slides, by Coulomb's law.
+    length is 0 where g is above 0, k g^2 / (4 w) down to g = -2 w, and -k (g + w) below: its slope
+    is continuous. The default law hardens from a tenth of the radius on. Friction holds what does
+    not slide by a spring of `stick_stiffness` along the surface; from friction times the normal
+    force on it slides, by Coulomb's law.
 
     Attributes:
         stiffness: k (N/m^2). By default that of the hose's own section, EA / (pi r^2).
@@ -146,11 +146,12 @@ class ContactLaw:
         """
         assert self.stiffness is not None
         assert self.width is not None
-        return float(self.width - np.sqrt(4.0 * self.width * load / self.stiffness))
+        return -float(np.sqrt(4.0 * self.width * load / self.stiffness))
 
 
 _WIDTH = 0.02
-"""Of the radius: where the default law begins. A tenth of it costs twice the iterations."""
+"""Of the radius: over twice this depth the default law stiffens. A tenth of it costs twice the
+iterations."""
 _SOFTER = 0.1
 """What sticks is softer along a surface than across it by this, by default: quieter at stops."""
 MOST_POINTS = 1000

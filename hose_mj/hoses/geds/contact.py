@@ -16,6 +16,7 @@ from hose_mj.hoses.geds.contact_law import (
     DEEPEST,
     IMPACTS,
     MARGIN,
+    OBSTACLES,
     RADIUS,
     SLOTS,
     STAGE,
@@ -147,7 +148,7 @@ def add_contact(axes, contact, x, motion, exact, gradient, band):
     for e in range(len(contact.first) - 1):
         start, n_before = e * len(axes), n_contacts
         ball = find_span(axes, contact, e, x, motion.before)
-        is_fast = motion.step < np.inf and ball[2] > _FAST * law[RADIUS]
+        is_fast = ball[2] > _FAST * law[RADIUS]
         for g in range(first, contact.geoms.shape[0]):
             if not is_span_near(contact, g, ball):
                 continue
@@ -336,7 +337,8 @@ def _remember(axes, contact, q, g, start, touch, motion, state):
         closing = 0.0
         for c in range(3):
             closing -= v[c] * touch[1][c]
-        if closing > _IMPACT:
+        # Two hoses keep their momentum only where both go on by the same rule.
+        if closing > _IMPACT and g < contact.law[OBSTACLES]:
             found[IMPACTS] += 1.0
         for k in range(SLOTS):
             if memory[q, k, 0] == 0.0 and slot < 0:

@@ -34,9 +34,11 @@ from hose_mj.jit import kernel
     SELF_STIFFNESS,
     SELF_DAMPING,
     ROUND,
-) = range(11)
-"""Places in `Contact.law`; ROUND is the way round a closed loop (m), infinite in an open hose."""
-N_NUMBERS = 11
+    OBSTACLES,
+) = range(12)
+"""Places in `Contact.law`; ROUND is the way round a closed loop (m), infinite in an open hose,
+OBSTACLES how many of the shapes are no part of another hose."""
+N_NUMBERS = 12
 GIVEN = 11
 """Columns of a distance handed in: distance, normal (3), friction, surface velocity (3) and the
 place (3) of the contact point that it was measured at."""
@@ -59,7 +61,7 @@ class Contact(NamedTuple):
             (n - 1,), 1/m.
         geoms: one row a shape, see shapes.py, (G, ROW).
         given: distances handed in, one row a contact point, (Q, 11); (0, 11) for none.
-        law: numbers of the contact law, (11,); no self-contact where its stiffness is 0.
+        law: numbers of the contact law, (12,); no self-contact where its stiffness is 0.
         arcs: rest arc lengths of the contact points, (Q,), m.
         memory: what friction remembers at each point of up to three surfaces, (Q, 3, 4): 1 + the
             geom's number + 1, 0 for none, and z (3,), m; written when a step is accepted.
@@ -112,7 +114,7 @@ class Motion(NamedTuple):
 @kernel
 def make_push(width, gap):
     """The ramp S of a gap (m) and its slope by the depth."""
-    depth = max(width - gap, 0.0)
+    depth = max(-gap, 0.0)
     if depth < 2.0 * width:
         return depth * depth / (4.0 * width), depth / (2.0 * width)
     return depth - width, 1.0

@@ -398,7 +398,8 @@ class ContactSet:
         numbers[contact_law.DAMPING] = law.damping_time
         numbers[contact_law.STICK] = law.stick_stiffness
         numbers[contact_law.RADIUS] = radius
-        numbers[contact_law.MARGIN] = numbers[contact_law.WIDTH] + 2.0 * self._tolerance
+        numbers[contact_law.MARGIN] = 2.0 * self._tolerance
+        numbers[contact_law.OBSTACLES] = len(self.obstacles)
         numbers[contact_law.TIMESTEP] = self._timestep
         if law.self_contact:
             numbers[contact_law.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2

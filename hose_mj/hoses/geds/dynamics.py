@@ -211,6 +211,7 @@ class Dynamics:
     ) -> tuple[int, Array]:
         """Newton's iteration at one load; a hose with theta resets its frames now and then."""
         stage = (np.inf, x.copy(), np.zeros_like(x))
+        work.start[:] = work.x_now[:] = x
         state = integrators.make_state(len(x))
         state.x[:] = x
         has_theta = len(self.axes) == 4

@@ -79,7 +79,7 @@ def _find_nearest(room, q, j):
 def _are_spans_apart(contact, e, f):
     room = contact.room
     base = contact.points.shape[0]
-    reach = room[base + e, 3] + room[base + f, 3] + 2.0 * contact.law[RADIUS] + contact.law[WIDTH]
+    reach = room[base + e, 3] + room[base + f, 3] + 2.0 * contact.law[RADIUS]
     square = 0.0
     for c in range(3):
         square += (room[base + e, c] - room[base + f, c]) ** 2
@@ -115,7 +115,7 @@ def add_self_contact(axes, contact, x, rate, step, gradient, band):
                     if gap_in_arc < REACH * contact.law[RADIUS]:
                         continue
                     square, t = _find_nearest(room, q, j)
-                    reach = 2.0 * contact.law[RADIUS] + contact.law[WIDTH]
+                    reach = 2.0 * contact.law[RADIUS]
                     if square >= reach * reach:
                         continue
                     # Of neighbouring segments only the nearest counts, the first where they tie.

@@ -332,6 +332,7 @@ def test_wrong_obstacles_are_refused(make_hose):
         make_hose(scheme="verlet").contacts.add_floor()
 
 
+@pytest.mark.filterwarnings("ignore::hose_mj.HoseWarning")
 def test_random_states_among_obstacles_stay_finite():
     rng = np.random.default_rng(11)
     verdicts = touched = 0

@@ -72,7 +72,7 @@ def compute_energy(spline, contacts, x):
     distances, normals = np.zeros(len(points)), np.zeros_like(points)
     shapes.measure_points(contacts.contact.geoms, 0, points, distances, normals)
     k, width = contacts.law.stiffness, contacts.law.width
-    depth = np.maximum(width - (distances - SPEC.outer_radius), 0.0)
+    depth = np.maximum(SPEC.outer_radius - distances, 0.0)
     ramp = k * np.minimum(depth, 2 * width) ** 3 / (12 * width)
     beyond = np.maximum(depth - 2 * width, 0.0)
     energy = ramp + k * beyond * (width + beyond / 2)

@@ -91,9 +91,9 @@ def test_a_straight_hose_does_not_touch_itself(make_hose):
 def test_self_contact_looks_closer_than_a_radius(make_hose):
     hose = make_hose(control_points=12)
     hose.set_obstacles([], ContactLaw(self_contact=True))
-    assert np.max(np.diff(hose.contacts.arc_lengths)) < 1.6 * RADIUS
-    hose.set_obstacles([], ContactLaw())
-    assert len(hose.contacts.arc_lengths) == 27
+    assert np.max(np.diff(hose.contacts.arc_lengths)) < 1.0001 * RADIUS
+    hose.set_obstacles([], ContactLaw(points_per_span=3))
+    assert len(hose.contacts.arc_lengths) == 28
 
 
 def make_crossing(make_hose, **options):
@@ -125,6 +125,7 @@ def test_hoses_that_cross_exchange_their_momentum(make_hose, scheme):
     assert one.position(0.475)[0, 2] > other.position(0.5)[0, 2] + RADIUS
 
 
+@pytest.mark.filterwarnings("ignore:a surface is:hose_mj.HoseWarning")  # pairs are soft
 def test_a_hose_lies_on_another(make_hose):
     lower, upper = make_hose(damping=0.02), make_hose(damping=0.02)
     for hose in (lower, upper):

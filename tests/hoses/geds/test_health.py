@@ -108,8 +108,13 @@ def test_where_a_hold_begins_in_statics_is_no_jump(hose):
 
 
 def test_a_deep_contact_is_said(hose):
-    floor = Obstacle(kind="plane", position=(0, 0, -0.1))
-    hose.set_obstacles([floor], ContactLaw(stiffness=30.0))
+    floor = Obstacle(kind="plane", position=(0, 0, -0.006))
+    hose.set_obstacles([floor])
+    hose.attach(0.5)  # within the floor
     with pytest.warns(HoseWarning, match="radii inside"):
-        hose.step(60)
+        hose.step()
+    hose.reset([[0, 0, 0.1], [1, 0, 0.1]])
+    hose.set_obstacles([floor], ContactLaw(stiffness=30.0))
+    hose.step(60)
     assert hose.health.deepest_contact > DEEPEST
+    assert hose.health.warnings == ()

@@ -18,7 +18,6 @@ from hose_mj.hoses.geds import (
     packing,
     point_masses,
     records,
-    stability,
     stepping,
 )
 from hose_mj.hoses.geds.constraints import ConstraintSet
@@ -202,7 +201,7 @@ class Dynamics:
         stiffest = float(np.abs(work.band[: len(self.state.x), 0]).max()) / mass
         least_rate = max(_ROUNDING * stiffest, _SLOW * bending)
         rows = self.constraints.rows
-        found = stability.is_positive(self.axes, self.hose, rows, least_rate, work)
+        found = newton.is_positive(self.axes, self.hose, rows, least_rate, work)
         twist.torque[:] = torque
         return bool(found)
 

@@ -23,7 +23,7 @@ from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSI
 from hose_mj.hoses.geds.self_contact import add_self_contact
 from hose_mj.hoses.geds.span import LEAST_A
 from hose_mj.hoses.geds.twist import predict_twist
-from hose_mj.jit import choose_by_unknowns, inlined, merged
+from hose_mj.jit import choose_by_unknowns, compiled, inlined, merged
 
 _MOST_SHORTENINGS = 12
 """Of one step: at the least factor of each that is 1e-12 of it, where rounding begins."""
@@ -189,8 +189,7 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
     A pivot that is not positive is answered with the Gauss-Newton matrix, counted as a fallback.
 
     Args:
-        axes: (0.0,) * n_dof.
-        hose: constants.
+        axes, hose: (0.0,) * n_dof, constants.
         stage: (h, X, V).
         constraints: rows and what they demand before and after the step.
         fraction: where in the step that demand is taken, 0 to 1.
@@ -202,8 +201,7 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
     """
     twist = constraints.twist
     fallbacks, shortened, iteration = 0, 0, 1
-    # True, but no constant: for one numba would compile all that takes it twice.
-    exact = fallbacks == 0
+    exact = fallbacks == 0  # no constant: for one numba would compile all that takes it twice
     factor = slope = 0.0
     softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
     loads.contact.found[STAGE] += 1.0
@@ -371,3 +369,31 @@ def _prepare_constraints(axes, constraints, fraction, weight, x, work):
     _shift_clamps(axes, constraints.twist, fraction, work.shift)
     if weight > 0.0:
         add_constraint_weight(axes, constraints, weight, len(x), work)
+
+
+@compiled
+def is_positive(axes, hose, constraints, least_rate, work):
+    """Whether stiffness plus `least_rate` times mass is positive definite on what rows leave free.
+
+    A motion that grows must grow faster than a rate: rounding alone, or a motion that nothing
+    resists (a hanging hose about the vertical, a hose without holds), is not called unstable.
+
+    Args:
+        axes: (0.0,) * n_dof.
+        hose: constants.
+        constraints: holds and twist, at the present shape.
+        least_rate: (1/s^2).
+        work: with the exact stiffness in its band; written.
+    """
+    size = len(work.signs)
+    add_mass(axes, hose, least_rate, work.band)
+    for k in range(len(work.gradient)):
+        work.gradient[k] = 0.0
+    for row in range(len(work.shift)):
+        work.shift[row] = 0.0
+    add_constraint_weight(axes, constraints, 1.0, size, work)
+    n_negative = factorize_indefinite(axes, size, work.band, work.signs)
+    if n_negative < 0:
+        return False
+    verdict = solve_with_constraints(axes, constraints, 0.0, 1.0, n_negative, size, work)
+    return verdict != NOT_POSITIVE

@@ -189,7 +189,8 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
     A pivot that is not positive is answered with the Gauss-Newton matrix, counted as a fallback.
 
     Args:
-        axes, hose: (0.0,) * n_dof, constants.
+        axes: (0.0,) * n_dof.
+        hose: constants.
         stage: (h, X, V).
         constraints: rows and what they demand before and after the step.
         fraction: where in the step that demand is taken, 0 to 1.
@@ -241,8 +242,7 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
         if iteration == limits.max_iterations:
             return NOT_CONVERGED, iteration, fallbacks
         iteration += 1
-        exact = True
-        shortened = 0
+        exact, shortened = True, 0
 
 
 @inlined

@@ -25,6 +25,7 @@ class Health:
     least_stretch: float  # |r'| now: 1 as long as at rest, near 0 folded
     laid_strain: float  # the largest as `reset` laid it
     largest_jump: float  # of a hold within a step (m)
+    crossings: int  # contact points that passed through another part of the hose
     warnings: tuple[str, ...]  # all that was said
 
 
@@ -56,13 +57,19 @@ class HealthWatch:
                 f"hose: move it by at most {LARGEST_JUMP * self._length:.3g} m a step",
             )
 
-    def check_steps(self, steps: int, retries: int, deepest: float) -> None:
+    def check_steps(self, steps: int, retries: int, deepest: float, crossings: int) -> None:
         """Looks at what was counted so far; `deepest` is in radii."""
         if deepest > DEEPEST:
             self._tell(
                 "contact",
                 f"a surface is {deepest:.2g} radii inside the hose: take shorter steps, or give "
                 "the contact law more stiffness",
+            )
+        if crossings > 0:
+            self._tell(
+                "crossings",
+                "the hose has passed through itself: take shorter steps; a knot drawn tight wants "
+                "a tenth of them",
             )
         before, known = self._looked
         if steps - before >= EVERY:
@@ -76,12 +83,17 @@ class HealthWatch:
                 )
 
     def report(
-        self, steps: int, retries: int, deepest: float, measure_stretch: Callable[[], float]
+        self,
+        steps: int,
+        retries: int,
+        deepest: float,
+        crossings: int,
+        measure_stretch: Callable[[], float],
     ) -> Health:
         """All of it."""
         share = (retries - self._retries_before) / max(steps, 1)
         said = tuple(self._said.values())
-        numbers = (measure_stretch(), self.laid_strain, self.largest_jump)
+        numbers = (measure_stretch(), self.laid_strain, self.largest_jump, crossings)
         return Health(steps, share, deepest, *numbers, said)
 
     def _tell(self, kind: str, text: str) -> None:

@@ -45,9 +45,10 @@ place (3) of the contact point that it was measured at."""
 SLOTS = 3
 """Surfaces that a contact point sticks to at once: the three sides of a corner. A fourth one does
 not rub."""
-TOUCHED, IMPACTS, DEEPEST, STAGE = range(4)
+TOUCHED, IMPACTS, DEEPEST, STAGE, CROSSINGS = range(5)
 """Places in `Contact.found`: pairs of the last build, points that newly touched at speed in the
-last step, the greatest depth so far, in radii, and the number of the stage."""
+last step, the greatest depth so far, in radii, the number of the stage, and how many points have
+passed through another part of the hose so far."""
 
 
 class Contact(NamedTuple):
@@ -70,8 +71,11 @@ class Contact(NamedTuple):
         pairs: points that touch or nearly touch at the last build, and the linear model of their
             force there, (Q + 64, 15): point, geom, force (3), stiffness (6), place (3), span.
         block: stiffness of one span's contact, for each pair of its control points, (10, 6).
-        found: see `TOUCHED`, (4,).
+        found: see `TOUCHED`, (5,).
         room: work space of self-contact, (Q + S, 4).
+        strands: what each point meets of the hose itself: arc length (-1 for nothing), direction
+            from there (3,) and distance at the last build, arc length and direction a step ago,
+            (Q, 9).
         forces: of `contact.compute_forces`, (Q, 3), written.
         reactions: of the same, (G, 6), written.
     """
@@ -89,6 +93,7 @@ class Contact(NamedTuple):
     block: Array
     found: Array
     room: Array
+    strands: Array
     forces: Array
     reactions: Array
 

@@ -62,6 +62,7 @@ class ContactSet:
     _block: Array
     _found: Array
     _room: Array
+    _strands: Array
 
     def __init__(
         self,
@@ -235,12 +236,18 @@ class ContactSet:
     def forget(self) -> None:
         """Lets go of what friction holds, and of the greatest depth."""
         self._memory[:] = 0.0
+        self._strands[:] = -1.0
         self._found[:] = 0.0
 
     @property
     def deepest(self) -> float:
         """The greatest depth of a contact since the last reset, in radii; 0 where nothing sank."""
         return float(self._found[contact_law.DEEPEST])
+
+    @property
+    def crossings(self) -> int:
+        """How many contact points have passed through another part of the hose since a reset."""
+        return int(self._found[contact_law.CROSSINGS])
 
     def set_closed(self, is_closed: bool) -> None:
         """Says whether the hose is a closed loop, whose ends do not touch each other."""
@@ -327,6 +334,7 @@ class ContactSet:
             "given": self._given.copy(),
             "capsules": self._capsules.copy(),
             "memory": self._memory.copy(),
+            "strands": self._strands.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -335,6 +343,7 @@ class ContactSet:
         self._given = state["given"].copy()
         self._capsules = state["capsules"].copy()
         self._memory[:] = state["memory"]
+        self._strands[:] = state["strands"]
         self._rebuild()
 
     # -- inside ----------------------------------------------------------------------------------
@@ -370,6 +379,7 @@ class ContactSet:
             block=self._block,
             found=self._found,
             room=self._room,
+            strands=self._strands,
             forces=np.zeros((len(self._points), 3)),
             reactions=np.zeros((len(geoms), 6)),
         )
@@ -428,8 +438,9 @@ class ContactSet:
         self._memory = np.zeros((count + 1, contact_law.SLOTS, 4))
         self._slides = np.zeros((count + 1, contact_law.SLOTS, 5))
         self._pairs = np.zeros((2 * (count + 1) + _SPARE, 15))
-        self._block, self._found = np.zeros((10, 6)), np.zeros(4)
+        self._block, self._found = np.zeros((10, 6)), np.zeros(5)
         self._room = np.zeros((count + 1 + n_spans, 4))
+        self._strands = np.full((count + 1, 9), -1.0)
 
     def _make_row(self, obstacle: Obstacle) -> Array:
         order, row = self.order, np.zeros(shapes.ROW)

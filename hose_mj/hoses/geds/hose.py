@@ -405,14 +405,14 @@ class GedsHose(SplineBody):
         steps, _, _, retries = self._counts.tolist()
         # How deep a law of one's own is to sink is one's own affair.
         sunk = self.contacts.deepest if self.contacts.law.stiffness is None else 0.0
-        self._watch.check_steps(steps, retries, sunk)
+        self._watch.check_steps(steps, retries, sunk, self.contacts.crossings)
 
     @property
     def health(self) -> Health:
         """How well it went since the last reset."""
         steps, _, _, retries = self._counts.tolist()
-        deepest = self.contacts.deepest
-        return self._watch.report(steps, retries, deepest, self.measure_least_stretch)
+        found = self.contacts.deepest, self.contacts.crossings
+        return self._watch.report(steps, retries, *found, self.measure_least_stretch)
 
     def solve_static(self, load_steps: int = 1) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.

@@ -13,7 +13,7 @@ import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.contact import accept_contact
-from hose_mj.hoses.geds.contact_law import IMPACTS
+from hose_mj.hoses.geds.contact_law import IMPACTS, SELF_STIFFNESS
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.kkt import multiply_row, solve_with_constraints
 from hose_mj.hoses.geds.newton import add_mass, build, newton
@@ -23,6 +23,7 @@ from hose_mj.hoses.geds.records import (
     NOT_FINITE,
     Limits,
 )
+from hose_mj.hoses.geds.self_contact import accept_strands
 from hose_mj.hoses.geds.twist import accept_twist, start_twist
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import choose_by_unknowns, inlined, kernel, merged
@@ -339,6 +340,8 @@ def end_step(axes, hose, constraints, contact, state, p):
         accept_contact(axes, contact, state)
         if contact.found[IMPACTS] > 0.0:
             state.started[0] = 0.0
+    if contact.law[SELF_STIFFNESS] > 0.0:
+        accept_strands(contact)
     response = constraints.response
     for row in range(len(constraints.start)):
         constraints.before[row] = constraints.after[row]

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from hose_mj.hoses.geds.contact_law import (
+    CROSSINGS,
     RADIUS,
     ROUND,
     SELF_DAMPING,
@@ -98,6 +99,8 @@ def add_self_contact(axes, contact, x, rate, step, gradient, band):
     n_spans = len(contact.first) - 1
     n_segments = contact.points.shape[0] - 1
     _load_places(axes, contact, x)
+    for q in range(contact.points.shape[0]):
+        contact.strands[q, 0] = -1.0
     room = contact.room
     n_contacts = 0
     for e in range(n_spans):
@@ -150,6 +153,9 @@ def _push_apart(axes, contact, pair, rate, step, gradient, band):
     away = 0.0
     for c in range(3):
         away += normal[c] * (v[c] - (1.0 - t) * a[c] - t * b[c])
+    _note_strand(
+        contact, q, (1.0 - t) * contact.arcs[j] + t * contact.arcs[j + 1], normal, distance
+    )
     push, slope = make_push(contact.law[WIDTH], distance - 2.0 * contact.law[RADIUS])
     damping = contact.law[SELF_DAMPING]
     N = 0.5 * contact.law[SELF_STIFFNESS] * max(push - damping * slope * away, 0.0)
@@ -168,6 +174,33 @@ def _push_apart(axes, contact, pair, rate, step, gradient, band):
     for at, start, share in ((q, start_q, 1.0), (j, start_j, t - 1.0), (j + 1, start_k, -t)):
         force = (length * share * N * n[0], length * share * N * n[1], length * share * N * n[2])
         _scatter(axes, points, at, start, force, (length * abs(share), rows), gradient, band)
+
+
+@kernel
+def _note_strand(contact, q, arc, normal, distance):
+    """Remembers what is nearest to a contact point."""
+    row = contact.strands
+    if row[q, 0] < 0.0 or distance < row[q, 4]:
+        row[q, 0], row[q, 4] = arc, distance
+        for c in range(3):
+            row[q, 1 + c] = normal[c]
+
+
+@kernel
+def accept_strands(contact):
+    """Ends a step: a point that is now on the other side of what it met has passed through it."""
+    row = contact.strands
+    for q in range(row.shape[0]):
+        near = REACH * contact.law[RADIUS]
+        if row[q, 0] >= 0.0 and row[q, 5] >= 0.0 and abs(row[q, 0] - row[q, 5]) < near:
+            along = 0.0
+            for c in range(3):
+                along += row[q, 1 + c] * row[q, 6 + c]
+            if along < 0.0:
+                contact.found[CROSSINGS] += 1.0
+        row[q, 5] = row[q, 0]
+        for c in range(3):
+            row[q, 6 + c] = row[q, 1 + c]
 
 
 @kernel

@@ -118,3 +118,35 @@ def test_a_deep_contact_is_said(hose):
     hose.step(60)
     assert hose.health.deepest_contact > DEEPEST
     assert hose.health.warnings == ()
+
+
+def test_a_knot_that_vanishes_is_said():
+    t = np.linspace(-2.35, 2.35, 723)
+    knot = 0.1 * np.stack(
+        [0.55 * (t**3 - 3 * t), 0.35 * (t**4 - 4 * t**2), 0.35 * (t**5 / 5 - 2 * t)], 1
+    )
+    length = np.linalg.norm(np.diff(knot, axis=0), axis=1).sum()
+    spec = HoseSpec(
+        length=length,
+        axial_stiffness=2e3,
+        bending_stiffness=2e-4,
+        linear_density=0.05,
+        outer_radius=0.005,
+        damping_time=0.005,
+        drag=0.2,
+    )
+    hose = make_hose("geds", spec, timestep=0.005, gravity=(0, 0, 0), control_points=64)
+    hose.set_obstacles([], ContactLaw(self_contact=True))
+    hose.reset(knot)
+    holds = [hose.attach(0.0), hose.attach(length)]
+    ends = hose.position([0.0, length])
+    way = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    with pytest.warns(HoseWarning, match="passed through itself"):
+        for k in range(1000):
+            hose.move(holds[0], ends[0] - way * 0.0005 * (k + 1))
+            hose.move(holds[1], ends[1] + way * 0.0005 * (k + 1))
+            hose.step()
+            if hose.health.crossings > 0:
+                break
+    ends = hose.position([0.0, length])
+    assert np.linalg.norm(ends[1] - ends[0]) > 0.8 * length

@@ -153,9 +153,8 @@ def _push_apart(axes, contact, pair, rate, step, gradient, band):
     away = 0.0
     for c in range(3):
         away += normal[c] * (v[c] - (1.0 - t) * a[c] - t * b[c])
-    _note_strand(
-        contact, q, (1.0 - t) * contact.arcs[j] + t * contact.arcs[j + 1], normal, distance
-    )
+    arc = (1.0 - t) * contact.arcs[j] + t * contact.arcs[j + 1]
+    _note_strand(contact, q, arc, normal, distance)
     push, slope = make_push(contact.law[WIDTH], distance - 2.0 * contact.law[RADIUS])
     damping = contact.law[SELF_DAMPING]
     N = 0.5 * contact.law[SELF_STIFFNESS] * max(push - damping * slope * away, 0.0)

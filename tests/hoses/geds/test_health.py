@@ -120,6 +120,7 @@ def test_a_deep_contact_is_said(hose):
     assert hose.health.warnings == ()
 
 
+@pytest.mark.filterwarnings("ignore:the hose is laid:hose_mj.HoseWarning")
 def test_a_knot_that_vanishes_is_said():
     t = np.linspace(-2.35, 2.35, 723)
     knot = 0.1 * np.stack(

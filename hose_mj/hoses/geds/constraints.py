@@ -591,8 +591,9 @@ class ConstraintSet:
         d, rows = self._spline.dimension, self.rows
         own = slice(held.first, held.first + len(held.multipliers))
         start, width = rows.start[held.first], 4 * self._spline.n_dof
-        if turns:
-            rows.rows[own, :width] = self._make_own_rows(held)
+        if turns and held.tangent is not None:
+            slopes = slice(held.first + d, held.first + 2 * d - 1)
+            rows.rows[slopes, :width] = self._make_slope_rows(held, held.tangent).reshape(-1, width)
         rows.before[own] = rows.rows[own, :width] @ self._x[start : start + width]
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
@@ -606,11 +607,17 @@ class ConstraintSet:
         for c in range(d):
             rows[c, :, c] = values[0]
         if held.tangent is not None:
-            for k, direction in enumerate(self._across(held.tangent)):
-                rows[d + k, :, :d] = values[1][:, None] * direction[self._spline.dims]
+            rows[d : 2 * d - 1] = self._make_slope_rows(held, held.tangent)
             if self._spline.has_theta:
                 rows[-1, :, 3] = values[0]
         return rows.reshape(len(rows), 4 * n_dof)
+
+    def _make_slope_rows(self, held: _Held, tangent: Array) -> Array:
+        """Those of its coefficients that keep r' from leaving a tangent, (d - 1, 4, n_dof)."""
+        rows = np.zeros((self._spline.dimension - 1, 4, self._spline.n_dof))
+        across = self._across(tangent)[:, None, self._spline.dims]
+        rows[:, :, : self._spline.dimension] = held.basis[1][None, :, None] * across
+        return rows
 
 
 def _list_clamps(held: Sequence[_Held]) -> list[Hold]:

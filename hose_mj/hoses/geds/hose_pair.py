@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.geds import basis
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.inputs import check_count
+from hose_mj.hoses.obstacles import MOST_POINTS
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import check_number
 
@@ -21,6 +25,9 @@ class HosePair:
     hose's share is explicit the contact is soft: its stiffness is the lighter hose's density over
     dt^2. Hoses sink into each other by the load per length over that, and pass through each other
     when they meet faster than about a radius a step.
+
+    The first hose's contact points come to stand half the lesser radius apart, unless its law says
+    how many there are: hoses touch each other along less than a radius.
 
     Args:
         first, second: hoses in space with one time step.
@@ -48,6 +55,7 @@ class HosePair:
         if capsules is None:
             capsules = min(int(np.ceil(second.spec.length / (2.0 * second.spec.outer_radius))), 200)
         check_count("capsules", capsules, 1, 1000)
+        _look_closer(first, min(first.spec.outer_radius, second.spec.outer_radius))
         self.first, self.second, self.friction = first, second, float(friction)
         self._places = np.linspace(0.0, second.spec.length, capsules + 1)
         density = min(first.spec.linear_density, second.spec.linear_density)
@@ -70,3 +78,12 @@ class HosePair:
     def force(self) -> Array:
         """Force of the first hose on the second at the end of the last step (3,), N."""
         return np.asarray(self.first.contacts.compute_neighbour_forces().sum(axis=0))
+
+
+def _look_closer(hose: GedsHose, radius: float) -> None:
+    """Puts the contact points of a hose half a radius (m) apart, unless its law has a number."""
+    contacts = hose.contacts
+    if contacts.law.points_per_span is None:
+        span = hose.spec.length / (len(hose.control_points) - basis.DEGREE)
+        points = min(int(np.ceil(2.0 * span / radius)), MOST_POINTS)
+        contacts.set_obstacles(contacts.obstacles, replace(contacts.law, points_per_span=points))

@@ -284,3 +284,66 @@ def test_names_of_the_release_before_go_on_and_say_the_new_one():
         with pytest.warns(DeprecationWarning, match=f"hose_{old}"):
             found = getattr(world, old)([0.2])
         np.testing.assert_array_equal(found, new([0.2]))
+
+
+POSTS = """<mujoco model="posts">
+  <option timestep="0.002" integrator="implicitfast"/>
+  <custom><numeric name="hose_length" data="2.0"/><text name="hose_material" data="garden-hose-19mm"/>
+    <numeric name="hose_friction" data="0.4"/></custom>
+  <worldbody><geom name="floor" type="plane" size="9 9 0.1"/>{posts}
+    <site name="hose_source" pos="0 0 0.02"/><site name="goal" pos="1.2 1.0 0.02"/>
+    <body name="robot0/puck" pos="1.88 0 0.06">
+      <joint name="robot0/x" type="slide" axis="1 0 0" damping="{drag}"/>
+      <joint name="robot0/y" type="slide" axis="0 1 0" damping="{drag}"/>
+      <geom type="cylinder" size="0.06 0.05" mass="4"/><site name="robot0/hose_attach"/></body>
+  </worldbody>
+  <actuator><motor joint="robot0/x" ctrlrange="-200 200"/>
+    <motor joint="robot0/y" ctrlrange="-200 200"/></actuator>
+</mujoco>"""
+
+
+def read_posts(folder, posts, drag):
+    file = folder / "posts.xml"
+    file.write_text(POSTS.format(posts=posts, drag=drag))
+    return make_world(str(file))
+
+
+def count_turns(world, place):
+    """How far the hose turns round a place, from its source to its tip (rad)."""
+    offset = world.hose_position(np.linspace(0, 2, 1200))[:, :2] - place
+    angle = np.unwrap(np.arctan2(offset[:, 1], offset[:, 0]))
+    return angle[-1] - angle[0], np.linalg.norm(offset, axis=1).min()
+
+
+@pytest.mark.slow
+def test_a_hose_pulled_round_a_post_stays_on_its_side(tmp_path):
+    post = '<geom name="post" type="cylinder" pos="0.9 0.2 0.2" size="0.1 0.2"/>'
+    world = read_posts(tmp_path, post, 5)
+    radius, last = world.scene.spec.outer_radius, None
+    while world.time < 4.0 - 1e-9:
+        t = world.time
+        way = np.array([0.3, 1.0] if t < 1.5 else [-1.0, 0.3])
+        ramp = min(1.0, (t if t < 1.5 else t - 1.5) / 0.3 + 0.1)
+        world.control[:] = 60.0 * ramp * way / np.linalg.norm(way)
+        world.step(5)
+        turn, near = count_turns(world, [0.9, 0.2])
+        assert (0.1 + radius - near) / radius < 0.3
+        assert last is None or abs(turn - last) < np.pi
+        last = turn
+
+
+@pytest.mark.slow
+def test_a_dragged_hose_passes_no_table_leg(tmp_path):
+    places = [0.74, 1.10, 1.32]
+    legs = "".join(
+        f'<geom name="leg{i}" type="cylinder" pos="{x} .35 .3" size=".02 .3"/>'
+        for i, x in enumerate(places)
+    )
+    world, last = read_posts(tmp_path, legs, 40), {}
+    while world.time < 5.0:
+        world.control[:] = [0.0, 40.0 if world.time < 3.0 else 0.0]
+        world.step(5)
+        for x in places:
+            turn, _ = count_turns(world, [x, 0.35])
+            assert abs(turn - last.get(x, turn)) < np.pi
+            last[x] = turn

@@ -289,7 +289,8 @@ def test_names_of_the_release_before_go_on_and_say_the_new_one():
 POSTS = """<mujoco model="posts">
   <option timestep="0.002" integrator="implicitfast"/>
   <custom><numeric name="hose_length" data="2.0"/>
-    <text name="hose_material" data="garden-hose-19mm"/><numeric name="hose_friction" data="0.4"/></custom>
+    <text name="hose_material" data="garden-hose-19mm"/>
+    <numeric name="hose_friction" data="0.4"/></custom>
   <worldbody><geom name="floor" type="plane" size="9 9 0.1"/>{posts}
     <site name="hose_source" pos="0 0 0.02"/><site name="goal" pos="1.2 1.0 0.02"/>
     <body name="robot0/puck" pos="1.88 0 0.06">

@@ -10,7 +10,7 @@ from hose_mj.errors import HoseWarning, StepError
 
 MOST_RETRIES = 0.5  # a step; impacts on thin walls take 0.3, free motions none
 DEEPEST = 0.3  # radii; the default law sinks 0.2 at the tension that breaks a hose
-LEAST_STRETCH = 0.5  # |r'|; a hose in use is compressed by less, a fold by far more
+LARGEST_STRAIN = 0.01  # as laid
 LARGEST_JUMP = 0.1  # of the length; what moves farther in a step throws the hose
 EVERY = 64  # steps between two looks at the retries
 
@@ -46,6 +46,21 @@ class HealthWatch:
         self._said: dict[str, str] = {}
         self._retries_before, self._looked = retries, (0, retries)
         self.largest_jump = self.laid_strain = 0.0
+
+    def resume(self, steps: int, retries: int) -> None:
+        """Goes on from counts that a snapshot has brought back."""
+        self._retries_before, self._looked = 0, (steps, retries)
+
+    def check_laid(self, strain: float, axial_stiffness: float) -> None:
+        """Looks at the largest strain as laid; its force is that of the stiffness (N)."""
+        self.laid_strain = strain
+        if abs(strain) > LARGEST_STRAIN:
+            self._tell(
+                "strain",
+                f"the hose is laid with a strain of {strain:.2%}, "
+                f"{abs(strain) * axial_stiffness:.3g} N of force; lay it along a curve of its "
+                f"length, {self._length:g} m, without corners",
+            )
 
     def check_jump(self, jump: float) -> None:
         """Looks at how far a hold goes within the step to come (m)."""
@@ -99,7 +114,7 @@ class HealthWatch:
     def _tell(self, kind: str, text: str) -> None:
         if kind in self._said:
             return
-        self._said[kind] = text
         if self._strict:
-            raise StepError(text)
+            raise StepError(text)  # every time: who goes on all the same is told again
+        self._said[kind] = text
         warnings.warn(text, HoseWarning, stacklevel=4)

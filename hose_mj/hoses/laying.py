@@ -13,8 +13,6 @@ _VALID = "finite numbers, shape (k, 3), m"
 _CHORDS = 1024
 _EVEN = 1e-3
 """Of the mean pace: a function whose pace varies by less is taken as it is."""
-LARGEST_LAID_STRAIN = 0.01
-"""Strain of a hose as laid above which it is worth a word."""
 
 
 def even_out(curve: Curve, length: float) -> Curve:

@@ -64,6 +64,7 @@ class BodyCoupling:
         d = self._dynamics
         d.run(stepping.ACCEPT, 1)
         d.counts[STEPS] += 1
+        d.check_health()
 
     def compute_positions(self) -> Array:
         """Where the holds of the last `try_step` would have the hose, (k, 3), m."""
@@ -96,6 +97,7 @@ class BodyCoupling:
         verdict = d.run(stepping.ADVANCE, int(n_steps), masses, first)
         if verdict != NEAR:
             d.check(verdict)
+        d.check_health()
         return int(d.counts[STEPS]) - before
 
     def _check_implicit(self) -> None:

@@ -59,7 +59,7 @@ class ConstraintSet:
     Attributes:
         rows: what the kernels read and write; made anew by every change.
         is_closed: whether the hose is a closed loop.
-        is_moved: whether a hold was made or moved since `measure_jump`.
+        is_moved: whether a hold was made or moved since the last step.
 
     The point moments on the hose are known here for their part along the tangent alone.
     """
@@ -188,7 +188,6 @@ class ConstraintSet:
 
     def measure_jump(self) -> float:
         """The farthest that a hold goes within the next step (m)."""
-        self.is_moved = False
         d, rows = self._spline.dimension, self.rows
         ways = [
             rows.after[h.first : h.first + d] - rows.before[h.first : h.first + d]

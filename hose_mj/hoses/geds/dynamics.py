@@ -23,9 +23,10 @@ from hose_mj.hoses.geds import (
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.contact_law import Motion
-from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, STEPS
+from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.twist import accept_twist
+from hose_mj.hoses.health import HealthWatch
 from hose_mj.hoses.protocol import Array, Linearization
 
 _ENDLESS = float(np.finfo(np.float64).max)
@@ -68,6 +69,7 @@ class Dynamics:
         timestep: length of a step (s).
         state: what a step changes.
         counts: see `integrators.STEPS`; the steps are those since the last reset, (4,).
+        watch: what says that a step leaves its healthy range.
         trial: the state after a step that was tried; see body_coupling.py.
     """
 
@@ -80,6 +82,7 @@ class Dynamics:
     timestep: float
     state: integrators.State
     counts: np.ndarray
+    watch: HealthWatch
 
     def __post_init__(self) -> None:
         self.trial = integrators.make_state(len(self.state.x))
@@ -92,7 +95,19 @@ class Dynamics:
 
     def advance(self, n_steps: int) -> None:
         """Takes n_steps steps; raises `StepError` for one that no fallback finished."""
+        if self.constraints.is_moved:
+            self.watch.check_jump(self.constraints.measure_jump())
+            self.constraints.is_moved = False
         self.check(self.run(stepping.ADVANCE, n_steps))
+        self.check_health()
+
+    def check_health(self) -> None:
+        """Looks at how the steps so far went; see `HealthWatch`."""
+        contacts = self.loads.contacts
+        # How deep a law of one's own is to sink is one's own affair.
+        sunk = contacts.deepest if contacts.law.stiffness is None else 0.0
+        steps, retries = int(self.counts[STEPS]), int(self.counts[RETRIES])
+        self.watch.check_steps(steps, retries, sunk, contacts.crossings)
 
     def run(
         self,

@@ -26,7 +26,6 @@ from hose_mj.hoses.geds.material_frames import check_rotation
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.health import Health, HealthWatch
 from hose_mj.hoses.inputs import check_count, check_records, check_rows, check_vector
-from hose_mj.hoses.laying import LARGEST_LAID_STRAIN
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.protocol import (
     Array,
@@ -124,12 +123,12 @@ class GedsHose(SplineBody):
         self.contacts = ContactSet(spline, spec, move, float(timestep), self._state, scheme)
         self._loads = LoadSet(spline, self._weight, self.contacts)
         self._counts = np.zeros(4, dtype=np.int64)
+        self._watch = HealthWatch(spec.length, strict)
         self._dynamics = Dynamics(
             *(self._axes, self._hose, self._constraints, self._loads, limits),
-            *(scheme, float(timestep), self._state, self._counts),
+            *(scheme, float(timestep), self._state, self._counts, self._watch),
         )
         self.coupling = BodyCoupling(self._dynamics)
-        self._watch = HealthWatch(spec.length, strict)
         if check_records("obstacles", obstacles, Obstacle):
             self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
@@ -181,15 +180,7 @@ class GedsHose(SplineBody):
         self._start(start)
         strains = self._measure_strains()[:, 0]
         largest = float(strains[np.argmax(np.abs(strains))])
-        self._watch.laid_strain = largest
-        if abs(largest) > LARGEST_LAID_STRAIN:
-            force = abs(largest) * self.spec.axial_stiffness
-            warnings.warn(
-                f"the hose is laid with a strain of {largest:.2%}, {force:.3g} N of force; lay it "
-                f"along a curve of its length, {self.spec.length:g} m, without corners",
-                HoseWarning,
-                stacklevel=2,
-            )
+        self._watch.check_laid(largest, self.spec.axial_stiffness)
 
     def set_control_points(self, points: ArrayLike) -> None:
         """Puts the control points at (n, 3) m, at rest, however odd; drops holds and loads.
@@ -242,6 +233,7 @@ class GedsHose(SplineBody):
         self._set_state(integrators.State(**read))
         self._spline.offset = offset
         self._counts[:] = counts
+        self._watch.resume(counts[0], counts[3])
         self._loads.restore(take(state, "loads"))
         self._constraints.restore(take(state, "holds"))
         self._constraints.set_moments(self._loads.list_moments())
@@ -399,13 +391,7 @@ class GedsHose(SplineBody):
         if check_count("n_steps", n_steps, 0) == 0:
             return
         self._warn_of_spin()
-        if self._constraints.is_moved:
-            self._watch.check_jump(self._constraints.measure_jump())
         self._dynamics.advance(int(n_steps))
-        steps, _, _, retries = self._counts.tolist()
-        # How deep a law of one's own is to sink is one's own affair.
-        sunk = self.contacts.deepest if self.contacts.law.stiffness is None else 0.0
-        self._watch.check_steps(steps, retries, sunk, self.contacts.crossings)
 
     @property
     def health(self) -> Health:

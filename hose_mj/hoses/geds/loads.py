@@ -21,7 +21,7 @@ class LoadSet:
     Args:
         spline: the hose's geometry.
         weight: generalised force of gravity on the control points, flat (n d,), N.
-        contacts: what may be touched.
+        contacts: what may be touched; kept.
     """
 
     _loads: records.Loads
@@ -29,14 +29,14 @@ class LoadSet:
     def __init__(self, spline: Spline, weight: Array, contacts: ContactSet) -> None:
         self._spline = spline
         self._weight = weight
-        self._contacts = contacts
+        self.contacts = contacts
         self.clear()
 
     @property
     def loads(self) -> records.Loads:
         """What the kernels read; made anew by every change."""
-        if self._loads.contact is not self._contacts.contact:
-            self._loads = self._loads._replace(contact=self._contacts.contact)
+        if self._loads.contact is not self.contacts.contact:
+            self._loads = self._loads._replace(contact=self.contacts.contact)
         return self._loads
 
     def clear(self) -> None:
@@ -127,4 +127,4 @@ class LoadSet:
             else:
                 moments[k, 0] = vector @ self._spline.normal
         values = np.ascontiguousarray(values[:, :2])
-        self._loads = records.Loads(force, starts, values, moments, self._contacts.contact)
+        self._loads = records.Loads(force, starts, values, moments, self.contacts.contact)

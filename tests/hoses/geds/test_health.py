@@ -95,7 +95,37 @@ def test_strict_refuses_the_step(hose):
     hose.move(hold, (1.0, 3.0, 0.0))
     with pytest.raises(StepError, match="moves by 3 m"):
         hose.step()
+    with pytest.raises(StepError, match="moves by 3 m"):
+        hose.step()  # to ask again changes nothing
     np.testing.assert_array_equal(hose.control_points, before)
+    hose.move(hold, (1.0, 0.0, 0.0))
+    hose.step()
+
+
+@pytest.mark.parametrize("hose", [True], indirect=True)
+def test_strict_refuses_a_strained_start(hose):
+    with pytest.raises(StepError, match="laid with a strain"):
+        hose.reset([[0, 0, 0], [1.1, 0, 0]])
+
+
+def test_steps_with_bodies_are_looked_at_too(hose):
+    floor = Obstacle(kind="plane", position=(0, 0, -0.006))
+    hose.set_obstacles([floor])
+    middle, tip = hose.attach(0.5), hose.attach(1.0)
+    place = hose.position(1.0)
+    hose.coupling.try_step([tip], place, 1e-3 * np.eye(3))
+    with pytest.warns(HoseWarning, match="radii inside"):
+        hose.coupling.accept_step()
+    assert middle in hose.holds
+
+
+def test_health_goes_on_from_a_snapshot(hose):
+    hose.step(80)
+    saved = hose.snapshot()
+    hose.step(200)
+    hose.restore(saved)
+    assert hose.health.steps == 80
+    assert hose.health.retry_share == 0.0
 
 
 def test_where_a_hold_begins_in_statics_is_no_jump(hose):

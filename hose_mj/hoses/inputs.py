@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hose_mj.errors import HoseError, InputError
+from hose_mj.errors import InputError
 from hose_mj.hoses.protocol import Array, Curve
 from hose_mj.toml_table import LARGEST_NUMBER
 
@@ -16,7 +15,6 @@ _LARGEST_COUNT = 2**31 - 1
 """MuJoCo counts steps in 32 bits."""
 _ODD = (TypeError, ValueError, OverflowError)
 """What numpy raises for values that are no numbers, or numbers that no float holds."""
-_MALFORMED = (*_ODD, LookupError, AttributeError)
 Kind = TypeVar("Kind")
 
 
@@ -48,23 +46,6 @@ def check_records(name: str, values: object, kind: type[Kind]) -> tuple[Kind, ..
         if not isinstance(value, kind):
             raise InputError(name, value, f"records of the class {kind.__name__}")
     return tuple(values)
-
-
-def restore_snapshot(state: object, before: Any, restore: Callable[[Any], None]) -> None:
-    """Restores a snapshot; the one taken before is restored where that cannot be done.
-
-    Raises:
-        InputError: a state that is no snapshot of what `restore` belongs to.
-    """
-    try:
-        restore(state)
-    except (HoseError, *_MALFORMED) as error:
-        restore(before)
-        if isinstance(error, HoseError):
-            raise
-        shown = sorted(map(str, state)) if isinstance(state, dict) else state
-        valid = f"what `snapshot` has returned ({type(error).__name__}: {error})"
-        raise InputError("state", shown, valid) from error
 
 
 def check_count(name: str, value: object, least: int, most: int | None = None) -> int:

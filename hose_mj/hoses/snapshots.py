@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hose_mj.errors import InputError
+from hose_mj.errors import HoseError, InputError
 from hose_mj.hoses.protocol import Array
 
 
@@ -72,10 +72,10 @@ def undo(restore: Callable[[], None]) -> Iterator[None]:
     """Calls `restore` where what is inside fails; what fails of an odd snapshot is `InputError`."""
     try:
         yield
-    except InputError:
+    except HoseError:
         restore()
         raise
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         restore()
         what = f"{type(error).__name__}: {error}"
-        raise InputError("state", what, "a snapshot of this hose") from error
+        raise InputError("state", what, "what `snapshot` has returned") from error

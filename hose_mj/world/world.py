@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.inputs import check_count, check_vector, restore_snapshot
+from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.protocol import Array
+from hose_mj.hoses.snapshots import undo
 from hose_mj.scenes.mjcf.model import reset_to_start
 from hose_mj.scenes.mjcf.scene import Scene
 from hose_mj.toml_table import LARGEST_NUMBER
@@ -177,7 +178,9 @@ class World(ABC):
 
     def restore(self, state: dict[str, Any]) -> None:
         """Returns to a snapshot of this world; `InputError` for what is none."""
-        restore_snapshot(state, self.snapshot(), self._restore)
+        before = self.snapshot()
+        with undo(lambda: self._restore(before)):
+            self._restore(state)
 
     def _restore(self, state: dict[str, Any]) -> None:
         size = mujoco.mj_stateSize(self.model, _STATE)

@@ -29,13 +29,13 @@ from hose_mj.hoses.geds.contact_law import (
 )
 from hose_mj.hoses.geds.shapes import POSITION, SCALE
 from hose_mj.hoses.geds.touch import (
-    _FAST,
+    FAST,
     compute_gap,
     compute_surface_move,
-    compute_surface_velocity,
     evaluate,
     find_next,
     find_span,
+    find_surface_velocity,
     is_skipped,
     is_span_near,
 )
@@ -68,12 +68,8 @@ def _compute_force(axes, contact, q, g, start, touch, motion, trial):
     """
     gap, normal, _, friction, point = touch
     zero = (0.0, 0.0, 0.0)
-    if g < 0:
-        row, scale = contact.given, 1.0
-        surface = (row[q, 5], row[q, 6], row[q, 7])
-    else:
-        scale = contact.geoms[g, SCALE]
-        surface = compute_surface_velocity(contact.geoms, g, point)
+    scale = 1.0 if g < 0 else contact.geoms[g, SCALE]
+    surface = find_surface_velocity(contact, q, g, point)
     away = 0.0
     if motion.step < np.inf:
         v = evaluate(axes, contact.points, q, start, motion.rate)
@@ -148,7 +144,7 @@ def add_contact(axes, contact, x, motion, exact, gradient, band):
     for e in range(len(contact.first) - 1):
         start, n_before = e * len(axes), n_contacts
         ball = find_span(axes, contact, e, x, motion.before)
-        is_fast = ball[2] > _FAST * law[RADIUS]
+        is_fast = ball[2] > FAST * law[RADIUS]
         for g in range(first, contact.geoms.shape[0]):
             if not is_span_near(contact, g, ball):
                 continue
@@ -270,7 +266,7 @@ def measure_contact_left(axes, contact, x, motion):
         before = evaluate(axes, contact.points, q, start, motion.before)
         for c in range(3):
             moved = max(moved, abs(now[c] - before[c]))
-        is_fast = moved > 0.5 * _FAST * contact.law[RADIUS]
+        is_fast = moved > 0.5 * FAST * contact.law[RADIUS]
         touch = compute_gap(axes, contact, q, g, start, x, motion, is_fast)
         force = _compute_force(axes, contact, q, g, start, touch, motion, 0.0)[0]
         d0, d1, d2 = now[0] - pairs[k, 11], now[1] - pairs[k, 12], now[2] - pairs[k, 13]
@@ -286,13 +282,13 @@ def measure_contact_left(axes, contact, x, motion):
 def accept_contact(axes, contact, state):
     """Makes friction remember a step that is done; counts impacts and keeps the greatest depth."""
     law, found = contact.law, contact.found
-    motion = Motion(state.v, state.x_old, state.x_old, law[TIMESTEP], law[TIMESTEP])
+    motion = Motion(state.v, state.x_old, state.x_old, law[TIMESTEP], law[TIMESTEP], 0.0)
     found[IMPACTS] = 0.0
     first = -1 if contact.given.shape[0] > 0 else 0
     for e in range(len(contact.first) - 1):
         start = e * len(axes)
         ball = find_span(axes, contact, e, state.x, state.x_old)
-        is_fast = ball[2] > _FAST * law[RADIUS]
+        is_fast = ball[2] > FAST * law[RADIUS]
         for q in range(contact.first[e], contact.first[e + 1]):
             for slot in range(SLOTS):
                 # Below zero: of the step before.
@@ -334,9 +330,10 @@ def _remember(axes, contact, q, g, start, touch, motion, state):
         return
     if slot < 0:
         v = evaluate(axes, contact.points, q, start, state.v_old)
+        surface = find_surface_velocity(contact, q, g, touch[4])
         closing = 0.0
         for c in range(3):
-            closing -= v[c] * touch[1][c]
+            closing -= (v[c] - surface[c]) * touch[1][c]
         # Two hoses keep their momentum only where both go on by the same rule.
         if closing > _IMPACT and g < contact.law[OBSTACLES]:
             found[IMPACTS] += 1.0
@@ -358,7 +355,7 @@ def compute_forces(axes, contact, x, v, forces, reactions):
     hose's centre line. In the hose's coordinates.
     """
     # Nothing moves any more: friction is what it remembers.
-    motion = Motion(v, x, x, contact.law[TIMESTEP], 0.0)
+    motion = Motion(v, x, x, contact.law[TIMESTEP], 0.0, 0.0)
     first = -1 if contact.given.shape[0] > 0 else 0
     forces[:, :] = 0.0
     reactions[:, :] = 0.0

@@ -107,6 +107,7 @@ class Motion(NamedTuple):
         before: the same of the part of the step that is being taken, for sweeps.
         step: length of the stage (s), for damping; infinite in statics, where nothing rubs.
         elapsed: since the beginning of the step (s).
+        ahead: how far ahead in time the shapes stand, which are where the whole step ends (s).
     """
 
     rate: Array
@@ -114,6 +115,7 @@ class Motion(NamedTuple):
     before: Array
     step: float
     elapsed: float
+    ahead: float
 
 
 @kernel

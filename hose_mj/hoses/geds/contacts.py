@@ -80,6 +80,7 @@ class ContactSet:
         rest = [c for c in range(3) if c not in spline.dims]
         self.order = [*spline.dims, *rest]
         self._parity = float(np.linalg.det(np.eye(3)[self.order]))
+        self._found = np.zeros(5)  # outlives what may be touched
         self._set((), ContactLaw())
 
     # -- what may be touched ---------------------------------------------------------------------
@@ -438,7 +439,7 @@ class ContactSet:
         self._memory = np.zeros((count + 1, contact_law.SLOTS, 4))
         self._slides = np.zeros((count + 1, contact_law.SLOTS, 5))
         self._pairs = np.zeros((2 * (count + 1) + _SPARE, 15))
-        self._block, self._found = np.zeros((10, 6)), np.zeros(5)
+        self._block = np.zeros((10, 6))
         self._room = np.zeros((count + 1 + n_spans, 4))
         self._strands = np.full((count + 1, 9), -1.0)
 

@@ -277,7 +277,7 @@ class Dynamics:
         )
         newton.add_moments(self.axes, loads, True, x, work)
         # Within a step without end nothing changes its velocity, but what slides still rubs.
-        motion = Motion(work.rate, x, x, _ENDLESS, 0.0)
+        motion = Motion(work.rate, x, x, _ENDLESS, 0.0, 0.0)
         add_contact(self.axes, loads.contact, x, motion, True, work.gradient, work.band)
         return work
 

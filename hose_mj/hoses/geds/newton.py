@@ -116,6 +116,16 @@ def add_moments(axes, loads, exact, x, work):
 
 
 @merged
+def _make_motion(contact, fraction, h, work):
+    """How the hose gets to the end of a stage, at a fraction of the step.
+
+    Merged, because it returns arrays: what is compiled without counts of references may not.
+    """
+    dt = contact.law[TIMESTEP]
+    return Motion(work.rate, work.start, work.x_now, h, fraction * dt, (1.0 - fraction) * dt)
+
+
+@merged
 def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     """Fills work.gradient with the residual without constraints, work.band with its derivative.
 
@@ -154,7 +164,7 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
     contact.found[TOUCHED] = 0.0
     if contact.geoms.shape[0] + contact.given.shape[0] > 0:
-        motion = Motion(work.rate, work.start, work.x_now, h, progress * contact.law[TIMESTEP])
+        motion = _make_motion(contact, progress, h, work)
         add_contact(axes, contact, x, motion, exact, work.gradient, work.band)
 
 
@@ -293,7 +303,7 @@ def _measure_left(axes, hose, stage, constraints, fraction, loads, x, work):
         h, X, _ = stage
         for k in range(len(x)):
             work.rate[k] = (x[k] - X[k]) / h
-        motion = Motion(work.rate, work.start, work.x_now, h, fraction * contact.law[TIMESTEP])
+        motion = _make_motion(contact, fraction, h, work)
         left += measure_contact_left(axes, contact, x, motion)
     return left / _measure_scale(hose, stage, constraints, loads, x, work)
 

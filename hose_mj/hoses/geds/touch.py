@@ -18,7 +18,7 @@ from hose_mj.hoses.geds.shapes import (
 from hose_mj.jit import apart, kernel
 
 _FLAT = ((0.0, 0.0), (0.0, 0.0, 0.0))
-_FAST = 0.25
+FAST = 0.25
 """Points that move less than this part of the radius in a step are not swept: what they could pass
 is thinner than the lattice of points resolves."""
 _LOOKS = 40
@@ -46,7 +46,7 @@ def evaluate(axes, points, q, start, x):
 
 
 @kernel
-def compute_surface_velocity(geoms, g, point):
+def _compute_surface_velocity(geoms, g, point):
     """Velocity of the geom's material at a point."""
     d0 = point[0] - geoms[g, POSITION]
     d1 = point[1] - geoms[g, POSITION + 1]
@@ -60,22 +60,30 @@ def compute_surface_velocity(geoms, g, point):
 
 
 @kernel
+def find_surface_velocity(contact, q, g, point):
+    """Velocity of what contact point q meets at a point; geom -1 is what was handed in."""
+    if g < 0:
+        row = contact.given
+        return row[q, 5], row[q, 6], row[q, 7]
+    return _compute_surface_velocity(contact.geoms, g, point)
+
+
+@kernel
 def compute_surface_move(contact, q, g, point, elapsed):
     """How far the material of geom g that is at a point now has moved in `elapsed` (m).
 
     To second order: on a turntable nothing may creep.
     """
+    v = find_surface_velocity(contact, q, g, point)
     if g < 0:
-        row = contact.given
-        return row[q, 5] * elapsed, row[q, 6] * elapsed, row[q, 7] * elapsed
+        return v[0] * elapsed, v[1] * elapsed, v[2] * elapsed
     geoms = contact.geoms
-    v = compute_surface_velocity(geoms, g, point)
     middle = (
         point[0] - 0.5 * elapsed * (v[0] - geoms[g, VELOCITY]),
         point[1] - 0.5 * elapsed * (v[1] - geoms[g, VELOCITY + 1]),
         point[2] - 0.5 * elapsed * (v[2] - geoms[g, VELOCITY + 2]),
     )
-    v = compute_surface_velocity(geoms, g, middle)
+    v = _compute_surface_velocity(geoms, g, middle)
     return v[0] * elapsed, v[1] * elapsed, v[2] * elapsed
 
 
@@ -153,14 +161,19 @@ def compute_gap(axes, contact, q, g, start, x, motion, is_fast):
         for c in range(3):
             gap += normal[c] * (point[c] - row[q, 8 + c])
         return gap, normal, _FLAT, row[q, 4], point
-    distance, normal, bend, axis = measure(contact.geoms, g, point)
+    at = point
+    if motion.ahead > 0.0:
+        # Where the shape stands at the end of the step, seen from it, this point will be there.
+        move = compute_surface_move(contact, q, g, point, motion.ahead)
+        at = (point[0] + move[0], point[1] + move[1], point[2] + move[2])
+    distance, normal, bend, axis = measure(contact.geoms, g, at)
     gap, curvature = distance - contact.law[RADIUS], (bend, axis)
     if is_fast:
         before = evaluate(axes, contact.points, q, start, motion.before)
         # Since then no more has gone by: one and a half stages of BDF2 make a step.
-        elapsed = min(motion.elapsed, 1.5 * motion.step)
+        elapsed = min(motion.elapsed, 1.5 * motion.step) + motion.ahead
         here = gap, normal, curvature
-        gap, normal, curvature = _sweep(contact, q, g, before, point, elapsed, here)
+        gap, normal, curvature = _sweep(contact, q, g, before, at, elapsed, here)
     return gap, normal, curvature, contact.geoms[g, FRICTION], point
 
 
@@ -177,7 +190,7 @@ def _sweep(contact, q, g, before, point, elapsed, here):
     chord = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
     distance, normal, _, _ = measure(contact.geoms, g, at)
     gap = distance - radius
-    if chord <= max(gap, _FAST * radius):
+    if chord <= max(gap, FAST * radius):
         return here
     t = 0.0
     for _ in range(_LOOKS):

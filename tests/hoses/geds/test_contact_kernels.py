@@ -54,7 +54,7 @@ def add(spline, contacts, x, rate, start, step, exact):
     size, width = len(x), 4 * spline.dimension
     gradient, band = np.zeros(size + width), np.zeros((size + width, 2 * width))
     contacts.contact.found[contact_law.STAGE] += 1
-    motion = contact_law.Motion(rate, start, start, step, STEP)
+    motion = contact_law.Motion(rate, start, start, step, STEP, 0.0)
     touching = contact.add_contact(spline.axes, contacts.contact, x, motion, exact, gradient, band)
     return gradient[:size], mechanics.make_dense(band, size, width), touching
 
@@ -253,7 +253,7 @@ def test_a_fourth_unknown_is_left_alone():
     wide, band = np.zeros(size + 16), np.zeros((size + 16, 32))
     contacts.contact.found[contact_law.STAGE] += 1
     begun = widen(start)
-    motion = contact_law.Motion(widen(rate), begun, begun, STEP, STEP)
+    motion = contact_law.Motion(widen(rate), begun, begun, STEP, STEP, 0.0)
     arguments = (contacts.contact, widen(x), motion, True)
     assert contact.add_contact(axes, *arguments, wide, band) == touching > 0
     places = np.arange(size).reshape(N, 4)

@@ -8,7 +8,7 @@ from hose_mj import HoseSpec, Obstacle, make_hose
 RADIUS = 0.01
 
 
-def make(length=1.0, **options):
+def make(length=1.0, drag=0.1, **options):
     spec = HoseSpec(
         length=length,
         axial_stiffness=2e4,
@@ -16,7 +16,7 @@ def make(length=1.0, **options):
         linear_density=0.1,
         outer_radius=RADIUS,
         damping_time=0.005,
-        drag=0.1,
+        drag=drag,
     )
     return make_hose("geds", spec, **options)
 
@@ -132,3 +132,21 @@ def test_a_turntable_carries_a_hose_round():
     ends = hose.position([0.0, 1.0])
     # 1 rad/s asks for .11 g at the outer end: friction holds that.
     np.testing.assert_allclose(ends[:, :2], [[-0.1, 0.0], [-1.1, 0.0]], atol=5e-3)
+
+
+@pytest.mark.parametrize("speed", [0.5, 3.0])
+def test_it_is_the_same_who_comes_to_whom(speed):
+    """Galilei: a hose thrown at a floor, and a floor that comes up to a hose at rest."""
+    runs = []
+    for floor_speed in (0.0, speed):
+        floor = Obstacle(kind="plane", velocity=(0, 0, floor_speed), friction=0.3)
+        hose = make(timestep=0.005, gravity=(0, 0, 0), obstacles=[floor], drag=0.0)
+        hose.reset([[0, 0, 0.03], [1, 0, 0.08]], (0.0, 0.0, floor_speed - speed))
+        shape = []
+        for k in range(60):
+            height = floor_speed * 0.005 * (k + 1)
+            hose.contacts.move_obstacle(0, position=(0, 0, height))
+            hose.step()
+            shape.append(hose.control_points - [0, 0, height])
+        runs.append(np.array(shape))
+    np.testing.assert_allclose(runs[0], runs[1], atol=1e-6)

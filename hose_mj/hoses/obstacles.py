@@ -94,8 +94,8 @@ class ContactLaw:
         stick_stiffness: kt (N/m^2); by default k / 10.
         points_per_span: contact is looked for at so many points in each span of the spline; None
             for as many as stand within a radius of each other.
-        self_contact: whether the hose may touch itself, without friction; its stiffness is tied to
-            the time step dt: 2 linear density / dt^2, see geds/self_contact.py.
+        self_contact: whether the hose may touch itself, with a tenth of both stiffnesses.
+        self_friction: Coulomb's coefficient of the hose on itself.
         slip_speed: of no effect since friction holds; goes on for one release.
 
     Raises:
@@ -108,6 +108,7 @@ class ContactLaw:
     stick_stiffness: float | None = None
     points_per_span: int | None = None
     self_contact: bool = False
+    self_friction: float = 0.0
     slip_speed: float | None = None
 
     def __post_init__(self) -> None:
@@ -116,6 +117,7 @@ class ContactLaw:
                 check_number(f"contact {name}", getattr(self, name))
         if self.damping_time is not None:
             check_number("contact damping_time", self.damping_time, may_be_zero=True)
+        check_number("self_friction", self.self_friction, may_be_zero=True)
         if self.slip_speed is not None:
             check_number("slip_speed", self.slip_speed)
             warnings.warn(

@@ -30,6 +30,7 @@ from hose_mj.hoses.geds.contact_law import (
 from hose_mj.hoses.geds.shapes import POSITION, SCALE
 from hose_mj.hoses.geds.touch import (
     FAST,
+    IMPACT,
     compute_gap,
     compute_surface_move,
     evaluate,
@@ -40,10 +41,6 @@ from hose_mj.hoses.geds.touch import (
     is_span_near,
 )
 from hose_mj.jit import apart, compiled, inlined, kernel
-
-_IMPACT = 0.05
-"""A point that newly touches faster than this (m/s) ends BDF2's memory: it would bring back the
-speed from before the wall, and energy with it."""
 
 
 @kernel
@@ -281,9 +278,8 @@ def measure_contact_left(axes, contact, x, motion):
 @kernel
 def accept_contact(axes, contact, state):
     """Makes friction remember a step that is done; counts impacts and keeps the greatest depth."""
-    law, found = contact.law, contact.found
+    law = contact.law
     motion = Motion(state.v, state.x_old, state.x_old, law[TIMESTEP], law[TIMESTEP], 0.0)
-    found[IMPACTS] = 0.0
     first = -1 if contact.given.shape[0] > 0 else 0
     for e in range(len(contact.first) - 1):
         start = e * len(axes)
@@ -335,7 +331,7 @@ def _remember(axes, contact, q, g, start, touch, motion, state):
         for c in range(3):
             closing -= (v[c] - surface[c]) * touch[1][c]
         # Two hoses keep their momentum only where both go on by the same rule.
-        if closing > _IMPACT and g < contact.law[OBSTACLES]:
+        if closing > IMPACT and g < contact.law[OBSTACLES]:
             found[IMPACTS] += 1.0
         for k in range(SLOTS):
             if memory[q, k, 0] == 0.0 and slot < 0:

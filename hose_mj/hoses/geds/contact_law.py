@@ -31,24 +31,26 @@ from hose_mj.jit import kernel
     RADIUS,
     MARGIN,
     TIMESTEP,
-    SELF_STIFFNESS,
-    SELF_DAMPING,
+    SELF_SCALE,
+    SELF_WIDTH,
+    SELF_FRICTION,
     ROUND,
     OBSTACLES,
-) = range(12)
+) = range(13)
 """Places in `Contact.law`; ROUND is the way round a closed loop (m), infinite in an open hose,
 OBSTACLES how many of the shapes are no part of another hose."""
-N_NUMBERS = 12
+N_NUMBERS = 13
 GIVEN = 11
 """Columns of a distance handed in: distance, normal (3), friction, surface velocity (3) and the
 place (3) of the contact point that it was measured at."""
 SLOTS = 3
 """Surfaces that a contact point sticks to at once: the three sides of a corner. A fourth one does
 not rub."""
-TOUCHED, IMPACTS, DEEPEST, STAGE, CROSSINGS = range(5)
+TOUCHED, IMPACTS, DEEPEST, STAGE, CROSSINGS, PAIRS, SIGHT = range(7)
 """Places in `Contact.found`: pairs of the last build, points that newly touched at speed in the
-last step, the greatest depth so far, in radii, the number of the stage, and how many points have
-passed through another part of the hose so far."""
+last step, the greatest depth so far, in radii, the number of the stage, how many points were beyond
+the middle of another part of the hose so far, how many were near one at the last build, and how far
+apart parts are seen (m)."""
 
 
 class Contact(NamedTuple):
@@ -62,7 +64,7 @@ class Contact(NamedTuple):
             (n - 1,), 1/m.
         geoms: one row a shape, see shapes.py, (G, ROW).
         given: distances handed in, one row a contact point, (Q, 11); (0, 11) for none.
-        law: numbers of the contact law, (12,); no self-contact where its stiffness is 0.
+        law: numbers of the contact law, (13,); no self-contact where its scale is 0.
         arcs: rest arc lengths of the contact points, (Q,), m.
         memory: what friction remembers at each point of up to three surfaces, (Q, 3, 4): 1 + the
             geom's number + 1, 0 for none, and z (3,), m; written when a step is accepted.
@@ -71,11 +73,11 @@ class Contact(NamedTuple):
         pairs: points that touch or nearly touch at the last build, and the linear model of their
             force there, (Q + 64, 15): point, geom, force (3), stiffness (6), place (3), span.
         block: stiffness of one span's contact, for each pair of its control points, (10, 6).
-        found: see `TOUCHED`, (5,).
-        room: work space of self-contact, (Q + S, 4).
-        strands: what each point meets of the hose itself: arc length (-1 for nothing), direction
-            from there (3,) and distance at the last build, arc length and direction a step ago,
-            (Q, 9).
+        found: see `TOUCHED`, (7,).
+        changes: derivatives of the basis functions at the contact points, (Q, 4), 1/m.
+        room: work space of self-contact, (Q + S, 6).
+        mates: what is near to each other of the hose itself, see self_contact.py.
+        strands: what was near to each point a step ago, (Q, 2, 8), see self_contact.py.
         forces: of `contact.compute_forces`, (Q, 3), written.
         reactions: of the same, (G, 6), written.
     """
@@ -92,7 +94,9 @@ class Contact(NamedTuple):
     pairs: Array
     block: Array
     found: Array
+    changes: Array
     room: Array
+    mates: Array
     strands: Array
     forces: Array
     reactions: Array

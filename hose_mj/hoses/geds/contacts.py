@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import basis, contact, contact_law, shapes
+from hose_mj.hoses.geds import basis, contact, contact_law, self_contact, shapes
 from hose_mj.hoses.geds.integrators import State
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_count, check_records, read_numbers
@@ -28,6 +28,10 @@ _CODES = {
 _HARDENING = 0.1
 """From this part of the radius on the default law hardens: twice as hard there, five times at two
 such depths, so that what breaks the hose does not cut it."""
+_SELF_SCALE, _SELF_WIDTH = 0.1, 0.1
+"""Of the stiffness, and of the radius: what meets along less than a radius is softer."""
+_MOST_SOFT = 512
+"""Soft rows of a hose on itself at most, of which the solve costs the square."""
 _SPARE = 64
 """Room for pairs beyond two surfaces at every contact point."""
 
@@ -61,7 +65,9 @@ class ContactSet:
     _pairs: Array
     _block: Array
     _found: Array
+    _changes: Array
     _room: Array
+    _mates: Array
     _strands: Array
 
     def __init__(
@@ -80,7 +86,7 @@ class ContactSet:
         rest = [c for c in range(3) if c not in spline.dims]
         self.order = [*spline.dims, *rest]
         self._parity = float(np.linalg.det(np.eye(3)[self.order]))
-        self._found = np.zeros(5)  # outlives what may be touched
+        self._found = np.zeros(7)  # outlives what may be touched
         self._set((), ContactLaw())
 
     # -- what may be touched ---------------------------------------------------------------------
@@ -237,7 +243,8 @@ class ContactSet:
     def forget(self) -> None:
         """Lets go of what friction holds, and of the greatest depth."""
         self._memory[:] = 0.0
-        self._strands[:] = -1.0
+        self._strands[:] = 0.0
+        self._strands[:, :, 0] = -1.0
         self._found[:] = 0.0
 
     @property
@@ -246,8 +253,13 @@ class ContactSet:
         return float(self._found[contact_law.DEEPEST])
 
     @property
+    def n_soft(self) -> int:
+        """How many soft rows contact may add to the matrix."""
+        return min(3 * len(self._mates), _MOST_SOFT)
+
+    @property
     def crossings(self) -> int:
-        """How many contact points have passed through another part of the hose since a reset."""
+        """How often a contact point was beyond the middle of another part of the hose."""
         return int(self._found[contact_law.CROSSINGS])
 
     def set_closed(self, is_closed: bool) -> None:
@@ -379,7 +391,9 @@ class ContactSet:
             pairs=self._pairs,
             block=self._block,
             found=self._found,
+            changes=self._changes,
             room=self._room,
+            mates=self._mates,
             strands=self._strands,
             forces=np.zeros((len(self._points), 3)),
             reactions=np.zeros((len(geoms), 6)),
@@ -413,8 +427,9 @@ class ContactSet:
         numbers[contact_law.OBSTACLES] = len(self.obstacles)
         numbers[contact_law.TIMESTEP] = self._timestep
         if law.self_contact:
-            numbers[contact_law.SELF_STIFFNESS] = 2.0 * spec.linear_density / self._timestep**2
-            numbers[contact_law.SELF_DAMPING] = 0.25 * self._timestep
+            numbers[contact_law.SELF_SCALE] = _SELF_SCALE
+            numbers[contact_law.SELF_WIDTH] = _SELF_WIDTH * radius
+            numbers[contact_law.SELF_FRICTION] = law.self_friction
         return numbers
 
     def _make_points(self) -> None:
@@ -440,8 +455,12 @@ class ContactSet:
         self._slides = np.zeros((count + 1, contact_law.SLOTS, 5))
         self._pairs = np.zeros((2 * (count + 1) + _SPARE, 15))
         self._block = np.zeros((10, 6))
-        self._room = np.zeros((count + 1 + n_spans, 4))
-        self._strands = np.full((count + 1, 9), -1.0)
+        self._changes = np.ascontiguousarray(values[:, 1])
+        self._room = np.zeros((count + 1 + n_spans, 6))
+        most = 4 * (count + 1) if self.law.self_contact else 0
+        self._mates = np.zeros((most, self_contact.MATE_ROW))
+        self._strands = np.zeros((count + 1, self_contact.MATES, self_contact.STRAND_ROW))
+        self._strands[:, :, 0] = -1.0
 
     def _make_row(self, obstacle: Obstacle) -> Array:
         order, row = self.order, np.zeros(shapes.ROW)

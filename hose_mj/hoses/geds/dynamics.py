@@ -25,6 +25,7 @@ from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.contact_law import Motion
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
+from hose_mj.hoses.geds.self_contact import accept_self_contact, add_self_contact
 from hose_mj.hoses.geds.twist import accept_twist
 from hose_mj.hoses.health import HealthWatch
 from hose_mj.hoses.protocol import Array, Linearization
@@ -156,7 +157,8 @@ class Dynamics:
         """
         rows, work = self.constraints.rows, self.make_work()
         verdict, found = records.NOT_CONVERGED, self.state.x
-        changing = (rows.twist.accepted, rows.twist.spin, rows.before, rows.after)
+        strands = self.loads.contacts.contact.strands
+        changing = (rows.twist.accepted, rows.twist.spin, rows.before, rows.after, strands)
         before = [part.copy() for part in changing]
         while verdict != records.DONE and load_steps <= MOST_LOAD_STEPS:
             _copy(before, changing)
@@ -180,6 +182,10 @@ class Dynamics:
             accept_twist(self.axes, rows.twist, self.state.x)
         elif len(self.axes) == 4:
             self._accept_frames(self.state, work)
+        contacts = self.loads.contacts
+        if contacts.law.self_contact:
+            accept_self_contact(self.axes, contacts.contact, self.state, np.inf)
+        self.check_health()
 
     def _list_stages(self, load_steps: int) -> list[tuple[records.Hose, float]]:
         """Hoses and shares of their loads through which a static solve goes, its own last.
@@ -259,7 +265,8 @@ class Dynamics:
     def make_work(self) -> records.Work:
         """Returns work arrays for the constraints of now."""
         n_points = len(self.state.x) // len(self.axes)
-        return records.make_work(n_points, len(self.axes), self.constraints.n_rows)
+        n_soft = self.loads.contacts.n_soft
+        return records.make_work(n_points, len(self.axes), self.constraints.n_rows, n_soft)
 
     def build_tangent(self) -> records.Work:
         """Returns work arrays with dU + C v less moments and contact in the gradient.
@@ -279,6 +286,9 @@ class Dynamics:
         # Within a step without end nothing changes its velocity, but what slides still rubs.
         motion = Motion(work.rate, x, x, _ENDLESS, 0.0, 0.0)
         add_contact(self.axes, loads.contact, x, motion, True, work.gradient, work.band)
+        if self.loads.contacts.law.self_contact:
+            work.start[:] = x
+            add_self_contact(self.axes, loads.contact, x, _ENDLESS, work)
         return work
 
     def linearize(self) -> Linearization:
@@ -287,6 +297,9 @@ class Dynamics:
         size, width = len(self.state.x), 4 * len(self.axes)
         stiffness = mechanics.make_dense(work.band, size, width)
         for row, compliance in zip(rows.twist.rows, rows.twist.compliance, strict=True):
+            stiffness += np.outer(row[:size], row[:size]) / compliance
+        count = int(work.soft.used[0])
+        for row, compliance in zip(work.soft.rows[:count], work.soft.compliance, strict=False):
             stiffness += np.outer(row[:size], row[:size]) / compliance
         work.band[:] = 0.0
         newton.add_mass(self.axes, self.hose, 1.0, work.band)

@@ -13,7 +13,7 @@ import numpy as np
 
 from hose_mj.hoses.geds.band import factorize
 from hose_mj.hoses.geds.contact import accept_contact
-from hose_mj.hoses.geds.contact_law import IMPACTS, SELF_STIFFNESS
+from hose_mj.hoses.geds.contact_law import IMPACTS, SELF_SCALE, TIMESTEP
 from hose_mj.hoses.geds.frames import accept_frames, restore_frames
 from hose_mj.hoses.geds.kkt import multiply_row, solve_with_constraints
 from hose_mj.hoses.geds.newton import add_mass, build, newton
@@ -23,7 +23,7 @@ from hose_mj.hoses.geds.records import (
     NOT_FINITE,
     Limits,
 )
-from hose_mj.hoses.geds.self_contact import accept_strands
+from hose_mj.hoses.geds.self_contact import accept_self_contact
 from hose_mj.hoses.geds.twist import accept_twist, start_twist
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import choose_by_unknowns, inlined, kernel, merged
@@ -336,12 +336,13 @@ def take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts):
 @merged
 def end_step(axes, hose, constraints, contact, state, p):
     """Accepts a step: constraints stand where they came to, twist and frames are what was found."""
+    contact.found[IMPACTS] = 0.0
     if contact.geoms.shape[0] + contact.given.shape[0] > 0:
         accept_contact(axes, contact, state)
-        if contact.found[IMPACTS] > 0.0:
-            state.started[0] = 0.0
-    if contact.law[SELF_STIFFNESS] > 0.0:
-        accept_strands(contact)
+    if contact.law[SELF_SCALE] > 0.0:
+        accept_self_contact(axes, contact, state, contact.law[TIMESTEP])
+    if contact.found[IMPACTS] > 0.0:
+        state.started[0] = 0.0
     response = constraints.response
     for row in range(len(constraints.start)):
         constraints.before[row] = constraints.after[row]

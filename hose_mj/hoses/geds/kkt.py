@@ -61,8 +61,8 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
     """Solves K dx - R^T lambda = -gradient, R dx + D lambda = shift with the factor in work.band.
 
     The rows R are those of the constraints (D = compliance of their response times
-    `compliance_factor`) and the derivatives of the segments' twist (D = compliance times
-    `softness`), which adds R^T R / D to K. Writes dx into work.gradient and lambda into
+    `compliance_factor`), the derivatives of the segments' twist (D = compliance times `softness`)
+    and those in work.soft, which add R^T R / D to K. Writes dx into work.gradient and lambda into
     work.multipliers. With K = L S L^T, S the signs of the pivots: Z = L^-1 R^T, and Z^T S Z + D is
     the matrix of lambda, so each row costs one forward solve.
 
@@ -71,7 +71,7 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
     not as many negative pivots as K, `n_negative`.
     """
     width = 4 * len(axes)
-    m = len(constraints.start) + len(constraints.twist.angle)
+    m = len(constraints.start) + len(constraints.twist.angle) + work.soft.used[0]
     z = work.lower
     _load_right_sides(width, m, constraints, size, work)
     solve_lower(axes, size, work.band, z)
@@ -101,8 +101,9 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
 
 @inlined
 def _load_right_sides(width, m, constraints, size, work):
-    """Writes R and, as row m, minus the gradient to work.lower; the twist asks for no shift."""
+    """Writes R and, as row m, minus the gradient to work.lower; soft rows ask for no shift."""
     n_constraints = len(constraints.start)
+    n_own = n_constraints + len(constraints.twist.angle)
     z = work.lower
     for row in range(n_constraints):
         for k in range(z.shape[1]):
@@ -111,7 +112,11 @@ def _load_right_sides(width, m, constraints, size, work):
             z[row, constraints.start[row] + k] = constraints.rows[row, k]
         for k in range(width, constraints.rows.shape[1]):
             z[row, size - 2 * width + k] += constraints.rows[row, k]
-    for row in range(n_constraints, m):
+    for row in range(n_own, m):
+        work.shift[row] = 0.0
+        for k in range(z.shape[1]):
+            z[row, k] = work.soft.rows[row - n_own, k]
+    for row in range(n_constraints, n_own):
         work.shift[row] = 0.0
         for k in range(size):
             z[row, k] = constraints.twist.rows[row - n_constraints, k]
@@ -127,6 +132,7 @@ def _load_right_sides(width, m, constraints, size, work):
 def _make_schur(m, constraints, softness, n_negative, size, work):
     """Writes the lower half of Z^T S Z, with the twist's D, and lambda's right-hand side."""
     n_constraints = len(constraints.start)
+    n_own = n_constraints + len(constraints.twist.angle)
     z = work.lower
     for row in range(m):
         product = 0.0
@@ -142,7 +148,9 @@ def _make_schur(m, constraints, softness, n_negative, size, work):
                 for k in range(size):
                     product += z[row, k] * z[other, k]
             work.schur[row, other] = product
-        if row >= n_constraints:
+        if row >= n_own:
+            work.schur[row, row] += work.soft.compliance[row - n_own]
+        elif row >= n_constraints:
             compliance = constraints.twist.compliance[row - n_constraints]
             work.schur[row, row] += softness * compliance
 

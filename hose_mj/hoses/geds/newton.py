@@ -15,12 +15,12 @@ import numpy as np
 
 from hose_mj.hoses.geds.band import factorize, factorize_indefinite
 from hose_mj.hoses.geds.contact import add_contact, measure_contact_left
-from hose_mj.hoses.geds.contact_law import STAGE, TIMESTEP, TOUCHED, Motion
+from hose_mj.hoses.geds.contact_law import SELF_SCALE, STAGE, TIMESTEP, TOUCHED, Motion
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
 from hose_mj.hoses.geds.kkt import add_constraint_weight, multiply_row, solve_with_constraints
 from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE
-from hose_mj.hoses.geds.self_contact import add_self_contact
+from hose_mj.hoses.geds.self_contact import add_self_contact, limit_move, measure_self_left
 from hose_mj.hoses.geds.span import LEAST_A
 from hose_mj.hoses.geds.twist import predict_twist
 from hose_mj.jit import choose_by_unknowns, compiled, inlined, merged
@@ -161,7 +161,8 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
     contact = loads.contact
-    add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
+    if contact.law[SELF_SCALE] > 0.0:
+        add_self_contact(axes, contact, x, h, work)
     contact.found[TOUCHED] = 0.0
     if contact.geoms.shape[0] + contact.given.shape[0] > 0:
         motion = _make_motion(contact, progress, h, work)
@@ -242,6 +243,8 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
             turn = _largest_turn(axes, hose.tables, x, work.step)
             if turn > limits.rotation_cap:
                 factor = limits.rotation_cap / turn
+        if loads.contact.law[SELF_SCALE] > 0.0:
+            factor = min(factor, limit_move(axes, loads.contact, work.step))
         _move(twist, factor, x, work)
         if factor == 1.0 and largest <= limits.tolerance:
             left = _measure_left(axes, hose, stage, constraints, fraction, loads, x, work)
@@ -299,10 +302,12 @@ def _measure_left(axes, hose, stage, constraints, fraction, loads, x, work):
     """What the step in work.step to x leaves of the forces, as part of their scale."""
     left = _measure_strain_left(axes, hose, work.step)
     contact = loads.contact
+    h, X, _ = stage
+    for k in range(len(x)):
+        work.rate[k] = (x[k] - X[k]) / h
+    if contact.law[SELF_SCALE] > 0.0:
+        left += measure_self_left(axes, contact, x, h, work)
     if contact.found[TOUCHED] > 0.0:
-        h, X, _ = stage
-        for k in range(len(x)):
-            work.rate[k] = (x[k] - X[k]) / h
         motion = _make_motion(contact, fraction, h, work)
         left += measure_contact_left(axes, contact, x, motion)
     return left / _measure_scale(hose, stage, constraints, loads, x, work)

@@ -138,6 +138,20 @@ class Limits(NamedTuple):
     force_tolerance: float
 
 
+class Soft(NamedTuple):
+    """Rows R that add R^T R / D to the matrix: what no band has room for.
+
+    Attributes:
+        rows: R, (P, n d + 4 d), written.
+        compliance: D, (P,), m/N, written.
+        used: how many there are now, (1,), written.
+    """
+
+    rows: Array
+    compliance: Array
+    used: np.ndarray
+
+
 class Work(NamedTuple):
     """Work arrays of one hose and the multipliers of its constraints.
 
@@ -164,15 +178,18 @@ class Work(NamedTuple):
     x_now: Array
     v_now: Array
     start: Array
+    soft: Soft
 
 
-def make_work(n_control_points: int, n_dof: int, n_rows: int) -> Work:
+def make_work(n_control_points: int, n_dof: int, n_rows: int, n_soft: int = 0) -> Work:
     """Returns work arrays for n control points of n_dof unknowns each and m rows.
 
-    The rows are those of the constraints and one for each segment that has twist.
+    The rows are those of the constraints and one for each segment that has twist; n_soft are those
+    of `Soft` at most.
     """
     size = n_control_points * n_dof
     padded = size + 4 * n_dof
+    n_rows += n_soft
     return Work(
         make_span(),
         np.zeros(padded),
@@ -191,4 +208,5 @@ def make_work(n_control_points: int, n_dof: int, n_rows: int) -> Work:
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),
+        Soft(np.zeros((n_soft, padded)), np.zeros(n_soft), np.zeros(1, dtype=np.int64)),
     )

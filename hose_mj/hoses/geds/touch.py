@@ -21,6 +21,9 @@ _FLAT = ((0.0, 0.0), (0.0, 0.0, 0.0))
 FAST = 0.25
 """Points that move less than this part of the radius in a step are not swept: what they could pass
 is thinner than the lattice of points resolves."""
+IMPACT = 0.05
+"""A point that newly touches faster than this (m/s) ends BDF2's memory: it would bring back the
+speed from before the wall, and energy with it."""
 _LOOKS = 40
 """Distances asked for along a sweep at most; each goes as far as it is free to."""
 _ARRIVED = 0.002

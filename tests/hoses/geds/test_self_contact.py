@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.geds import self_contact
 from hose_mj.hoses.geds.hose_pair import HosePair
 from hose_mj.hoses.obstacles import ContactLaw
 
@@ -172,3 +173,52 @@ def test_wrong_pairs_are_refused(make_hose):
         hose.contacts.set_neighbour(np.zeros((2, 3)), np.zeros((3, 3)), 0.01, 0.0, 1.0)
     with pytest.raises(InputError, match="forces"):
         hose.set_push([0.1, 0.2], np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("speed", [5.0, 40.0])
+@pytest.mark.filterwarnings("ignore::hose_mj.HoseWarning")  # up to ten radii a step
+def test_strands_that_are_thrown_at_each_other_do_not_pass(make_hose, speed):
+    hose = make_folded(make_hose, touches=True, timestep=0.005)
+    hose.reset(fold, lambda s: 2.0 * speed * close(s))
+    gaps = []
+    for _ in range(10):
+        hose.step()
+        gaps.append(measure_gap(hose))
+    assert hose.health.crossings == 0
+    assert min(gaps) > 0.9
+
+
+def test_the_matrix_is_the_derivative_of_the_force(make_hose):
+    """Soft rows against finite differences of the residual."""
+    hose = make_folded(make_hose, touches=True, timestep=0.001)
+    while measure_gap(hose) > 1.1:
+        hose.step()
+    dynamics = hose._dynamics
+    axes, x = dynamics.axes, dynamics.state.x.copy()
+    # Damping is linearized at a depth that stays.
+    hose.set_obstacles([], ContactLaw(self_contact=True, damping_time=0.0))
+    contact = dynamics.loads.loads.contact
+    # All of the lower strand goes up.
+    x[2 : 3 * 10 : 3] += 0.3 * RADIUS
+
+    def build(places):
+        work = dynamics.make_work()
+        work.start[:] = dynamics.state.x
+        self_contact.add_self_contact(axes, contact, places, 0.001, work)
+        rows = work.soft.rows[: work.soft.used[0], : len(x)]
+        return work.gradient[: len(x)], rows, work.soft.compliance[: len(rows)]
+
+    force, rows, compliance = build(x)
+    assert len(rows) > 5
+    matrix = rows.T @ (rows / compliance[:, None])
+    step = 1e-9
+    found = np.zeros_like(matrix)
+    for k in range(len(x)):
+        moved = x.copy()
+        moved[k] += step
+        found[:, k] = (build(moved)[0] - force) / step
+    # Left out is how the normal turns: N over the distance.
+    np.testing.assert_allclose(matrix, found, atol=0.05 * np.abs(matrix).max())
+    np.testing.assert_allclose(
+        force.reshape(-1, 3).sum(axis=0), 0.0, atol=1e-10 * np.abs(force).max()
+    )

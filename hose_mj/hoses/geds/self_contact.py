@@ -68,7 +68,7 @@ how far friction is drawn (3)."""
 
 @kernel
 def _load_places(axes, contact, x):
-    """Writes places and slopes of the contact points, then middle and radius of each span's ball."""
+    """Writes places and slopes of the contact points, then middle and radius of spans' balls."""
     n_points = contact.points.shape[0]
     room = contact.room
     n_spans = len(contact.first) - 1

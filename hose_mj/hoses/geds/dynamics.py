@@ -23,7 +23,7 @@ from hose_mj.hoses.geds import (
 from hose_mj.hoses.geds.constraints import ConstraintSet
 from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.contact_law import Motion
-from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, RETRIES, STEPS
+from hose_mj.hoses.geds.integrators import RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.self_contact import accept_self_contact, add_self_contact
 from hose_mj.hoses.geds.twist import accept_twist
@@ -130,12 +130,12 @@ class Dynamics:
         rows, loads, masses, first = parts
         session = stepping.Session(
             *(self.axes, self.hose, rows, loads, self.limits, self.timestep, self.state),
-            *(self.trial, self.counts, masses, first, self.make_work()),
+            *(self.trial, self.counts, 1.0, masses, first, self.make_work()),
         )
         self._packed, self._packed_of = packing.Packed(session), parts
         self._code = integrators.SCHEMES[self.scheme]
         kernel = stepping.advance_verlet if self.scheme == "verlet" else stepping.advance
-        self._enter = kernel.compile((self._packed.kind, *[types.int64] * 3))
+        self._enter = _open(kernel, self._packed)
 
     def check(self, verdict: int) -> None:
         """Raises `StepError` unless a step was done."""
@@ -230,10 +230,9 @@ class Dynamics:
         self, hose: records.Hose, scale: float, x: Array, work: records.Work
     ) -> tuple[int, Array]:
         """Newton's iteration at one load; a hose with theta resets its frames now and then."""
-        stage = (np.inf, x.copy(), np.zeros_like(x))
-        work.start[:] = work.x_now[:] = x
+        work.start[:] = work.x_now[:] = work.X[:] = work.x[:] = x
+        work.V[:] = 0.0
         state = integrators.make_state(len(x))
-        state.x[:] = x
         has_theta = len(self.axes) == 4
         length = self.hose.tables.span_length * len(self.hose.tables.first)
         most = _RESET_ITERATIONS if has_theta else _STATIC_ITERATIONS
@@ -241,17 +240,20 @@ class Dynamics:
             _STATIC_TOLERANCE * length, length, most, _STATIC_TURN, False, 1.0, np.inf
         )
         rows, verdict = self.constraints.rows, records.NOT_CONVERGED
+        session = stepping.Session(
+            *(self.axes, hose, rows, self.loads.loads, limits, np.inf, self.state, self.trial),
+            *(self.counts, scale, _NO_MASSES, _NO_ROWS, work),
+        )
+        packed = packing.Packed(session)
+        enter = _open(stepping.advance, packed)
         for _ in range(_STATIC_ITERATIONS // _RESET_ITERATIONS):
-            verdict, more, fell = newton.newton(
-                *(self.axes, hose, stage, rows, 1.0, self.loads.loads),
-                *(scale, limits, state.x, work),
-            )
-            self.counts[ITERATIONS] += more
-            self.counts[FALLBACKS] += fell
+            verdict = enter(packed.address, stepping.SETTLE, 0, 0)
+            state.x[:] = work.x
             if not has_theta or verdict not in (records.DONE, records.NOT_CONVERGED):
                 break
             theta = state.x[3::4].copy()
             self._accept_frames(state, work)
+            work.x[:] = state.x
             if verdict == records.DONE and np.array_equal(theta, state.x[3::4]):
                 break
         return verdict, state.x
@@ -305,6 +307,11 @@ class Dynamics:
         newton.add_mass(self.axes, self.hose, 1.0, work.band)
         mass = mechanics.make_dense(work.band, size, width)
         return Linearization(mass, stiffness, mechanics.make_dense_rows(rows, size, width))
+
+
+def _open(kernel: Any, packed: packing.Packed) -> Any:
+    """Compiles an entry to the dynamics for a record, or finds it compiled."""
+    return kernel.compile((packed.kind, *[types.int64] * 3))
 
 
 def _copy(source: list[Array], target: tuple[Array, ...]) -> None:

@@ -130,7 +130,7 @@ def _set_up_response(constraints, scheme, stage, part, parts):
 
 
 @merged
-def _try_step(axes, hose, constraints, loads, limits, scheme, dt, parts, state, work, counts):
+def _try_step(address, constraints, limits, scheme, dt, parts, state, work, counts):
     """Takes one step in equal parts; the result is in work.x_now, work.v_now and work.X, work.V.
 
     Returns the verdict and the length of the last stage.
@@ -150,18 +150,7 @@ def _try_step(axes, hose, constraints, loads, limits, scheme, dt, parts, state, 
             h, end = _set_up_stage(scheme, stage, dt / parts, state, work)
             fraction = (part + end) / parts
             _set_up_response(constraints, scheme, stage, part, parts)
-            verdict, iterations, fallbacks = newton(
-                axes,
-                hose,
-                (h, work.X, work.V),
-                constraints,
-                fraction,
-                loads,
-                1.0,
-                limits,
-                work.x,
-                work,
-            )
+            verdict, iterations, fallbacks = newton(address, h, fraction, limits)
             counts[ITERATIONS] += iterations
             counts[FALLBACKS] += fallbacks
             if verdict != DONE:
@@ -208,7 +197,7 @@ def start_step(axes, constraints, dt):
 
 
 @merged
-def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
+def _step_implicit(address, axes, constraints, limits, scheme, dt, state, work, counts):
     """One step; where its Newton fails, backward Euler, in the end in ever finer parts."""
     # A line search takes more, shorter steps: three times as many may be needed.
     most = 3 * limits.max_iterations
@@ -227,10 +216,8 @@ def _step_implicit(axes, hose, constraints, loads, limits, scheme, dt, state, wo
         parts = 1 if attempt < 3 else 8 ** (attempt - 2)
         start_step(axes, constraints, dt)
         verdict, h = _try_step(
-            axes,
-            hose,
+            address,
             constraints,
-            loads,
             limits if attempt < 2 else (careful if attempt < 4 else last),
             use,
             dt,
@@ -314,11 +301,12 @@ def _keep_multipliers(constraints, work, counts):
 
 
 @merged
-def take_step(axes, hose, constraints, loads, limits, scheme, dt, state, work, counts):
-    """Takes one step of an implicit scheme, but for what `end_step` does; returns a verdict."""
-    verdict = _step_implicit(
-        axes, hose, constraints, loads, limits, scheme, dt, state, work, counts
-    )
+def take_step(address, axes, constraints, limits, scheme, dt, state, work, counts):
+    """Takes one step of an implicit scheme, but for what `end_step` does; returns a verdict.
+
+    The records are those of the session at the address, but for the state.
+    """
+    verdict = _step_implicit(address, axes, constraints, limits, scheme, dt, state, work, counts)
     if verdict == DONE:
         _keep_multipliers(constraints, work, counts)
     return verdict

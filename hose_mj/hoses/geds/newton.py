@@ -19,11 +19,12 @@ from hose_mj.hoses.geds.contact_law import SELF_SCALE, STAGE, TIMESTEP, TOUCHED,
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
 from hose_mj.hoses.geds.kkt import add_constraint_weight, multiply_row, solve_with_constraints
+from hose_mj.hoses.geds.packing import unpack
 from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE
 from hose_mj.hoses.geds.self_contact import add_self_contact, limit_move, measure_self_left
 from hose_mj.hoses.geds.span import LEAST_A
 from hose_mj.hoses.geds.twist import predict_twist
-from hose_mj.jit import choose_by_unknowns, compiled, inlined, merged
+from hose_mj.jit import apart, choose_by_unknowns, compiled, inlined, merged
 
 _MOST_SHORTENINGS = 12
 """Of one step: at the least factor of each that is 1e-12 of it, where rounding begins."""
@@ -193,29 +194,29 @@ def _largest_turn(axes, tables, x, shift):
     return largest
 
 
-@merged
-def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, work):
-    """Newton's iteration on x in place; returns (verdict, iterations, fallbacks).
+@apart
+def newton(address, h, fraction, limits):
+    """Newton's iteration on work.x in place; returns (verdict, iterations, fallbacks).
+
+    Of steps and of statics, compiled once for both.
 
     A pivot that is not positive is answered with the Gauss-Newton matrix, counted as a fallback.
 
     Args:
-        axes: (0.0,) * n_dof.
-        hose: constants.
-        stage: (h, X, V).
-        constraints: rows and what they demand before and after the step.
-        fraction: where in the step that demand is taken, 0 to 1.
-        loads: dead loads.
-        scale: what they are multiplied by.
+        address: of the `stepping.Session`; its work arrays hold X, V and a guess x, and the
+            multipliers on return.
+        h: length of the stage (s); infinite in statics.
+        fraction: where in the step the constraints' demand is taken, 0 to 1.
         limits: when to stop.
-        x: flat control points (n d,); the guess on entry.
-        work: work arrays; multipliers on return.
     """
-    twist = constraints.twist
+    session = unpack(address)
+    axes, hose, constraints = session.axes, session.hose, session.constraints
+    loads, scale, work = session.loads, session.load_scale, session.work
+    x, stage, twist = work.x, (h, work.X, work.V), constraints.twist
     fallbacks, shortened, iteration = 0, 0, 1
     exact = fallbacks == 0  # no constant: for one numba would compile all that takes it twice
     factor = slope = 0.0
-    softness = 1.0 / (1.0 + hose.elasticity.damping_time / stage[0])
+    softness = 1.0 / (1.0 + hose.elasticity.damping_time / h)
     loads.contact.found[STAGE] += 1.0
     while True:
         build(axes, hose, stage, twist, fraction, loads, scale, exact, x, work)
@@ -238,13 +239,7 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
         largest, slope = _measure_step(axes, limits, len(x), work)
         if not np.isfinite(largest):
             return NOT_FINITE, iteration, fallbacks
-        factor = 1.0
-        if limits.rotation_cap < np.inf:
-            turn = _largest_turn(axes, hose.tables, x, work.step)
-            if turn > limits.rotation_cap:
-                factor = limits.rotation_cap / turn
-        if loads.contact.law[SELF_SCALE] > 0.0:
-            factor = min(factor, limit_move(axes, loads.contact, work.step))
+        factor = _find_factor(axes, hose, loads.contact, limits, x, work)
         _move(twist, factor, x, work)
         if factor == 1.0 and largest <= limits.tolerance:
             left = _measure_left(axes, hose, stage, constraints, fraction, loads, x, work)
@@ -256,6 +251,19 @@ def newton(axes, hose, stage, constraints, fraction, loads, scale, limits, x, wo
             return NOT_CONVERGED, iteration, fallbacks
         iteration += 1
         exact, shortened = True, 0
+
+
+@inlined
+def _find_factor(axes, hose, contact, limits, x, work):
+    """What part of a step is taken: all of it, unless it turns or moves something too far."""
+    factor = 1.0
+    if limits.rotation_cap < np.inf:
+        turn = _largest_turn(axes, hose.tables, x, work.step)
+        if turn > limits.rotation_cap:
+            factor = limits.rotation_cap / turn
+    if contact.law[SELF_SCALE] > 0.0:
+        factor = min(factor, limit_move(axes, contact, work.step))
+    return factor
 
 
 @inlined

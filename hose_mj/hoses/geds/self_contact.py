@@ -99,7 +99,7 @@ def _find_sight(contact):
 
 @kernel
 def _set_sight(axes, contact, state):
-    """Sees as far as parts of the hose may come to each other within two steps like the last one."""
+    """Sees as far as parts of the hose may come to each other in two steps like the last one."""
     d, n = len(axes), len(state.x) // len(axes)
     largest = 0.0
     for i in range(n):

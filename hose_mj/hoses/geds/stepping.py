@@ -11,20 +11,24 @@ import numpy as np
 
 from hose_mj.hoses.geds.contact import compute_forces
 from hose_mj.hoses.geds.integrators import (
+    FALLBACKS,
+    ITERATIONS,
     State,
     copy_state,
     end_step,
     take_step,
     take_verlet_step,
 )
+from hose_mj.hoses.geds.newton import newton
 from hose_mj.hoses.geds.packing import unpack
 from hose_mj.hoses.geds.point_masses import NEAR, PointMasses, aim, is_clear, move, move_shapes
 from hose_mj.hoses.geds.records import DONE, Constraints, Hose, Limits, Loads, Work
 from hose_mj.hoses.protocol import Array
 from hose_mj.jit import kernel
 
-ADVANCE, TRY, ACCEPT = range(3)
-"""What `advance` is to do: steps, one step into `trial`, or to make that one count."""
+ADVANCE, TRY, ACCEPT, SETTLE = range(4)
+"""What `advance` is to do: steps, one step into `trial`, to make that one count, or one solve of
+statics in the work arrays."""
 
 
 class Session(NamedTuple):
@@ -38,6 +42,7 @@ class Session(NamedTuple):
         state: what steps change.
         trial: the state after a step that was tried.
         counts: see `integrators.STEPS`, (4,).
+        load_scale: what loads are multiplied by: 1 but in statics.
         masses: at its attachments; none but where bodies are stepped with it.
         first: first rows of the masses' constraints, (k,).
         work: work arrays.
@@ -52,6 +57,7 @@ class Session(NamedTuple):
     state: State
     trial: State
     counts: Array
+    load_scale: float
     masses: PointMasses
     first: np.ndarray
     work: Work
@@ -64,9 +70,15 @@ def advance(address, what, scheme, n_steps):
     That of the last step tried: a step that fails leaves the state at the step before it. `NEAR`
     where a mass may meet something in the next step. See `ADVANCE` for what it is to do.
     """
-    axes, hose, constraints, loads, limits, dt, own, trial, counts, masses, first, work = unpack(
-        address
-    )
+    session = unpack(address)
+    axes, hose, constraints, loads = session.axes, session.hose, session.constraints, session.loads
+    limits, dt, own, trial = session.limits, session.timestep, session.state, session.trial
+    counts, masses, first, work = session.counts, session.masses, session.first, session.work
+    if what == SETTLE:
+        verdict, iterations, fallbacks = newton(address, np.inf, 1.0, limits)
+        counts[ITERATIONS] += iterations
+        counts[FALLBACKS] += fallbacks
+        return verdict
     if what == TRY:
         copy_state(own, trial)
     state = trial if what == TRY else own
@@ -78,9 +90,7 @@ def advance(address, what, scheme, n_steps):
                 if not is_clear(masses, dt):
                     return NEAR
                 aim(axes, constraints, masses, first, dt)
-            verdict = take_step(
-                axes, hose, constraints, loads, limits, scheme, dt, state, work, counts
-            )
+            verdict = take_step(address, axes, constraints, limits, scheme, dt, state, work, counts)
             if verdict != DONE or what == TRY:
                 return verdict
         end_step(axes, hose, constraints, loads.contact, state, work.span)

@@ -73,6 +73,7 @@ def run(args: Args) -> int:
             "records": study.list_records(),
             "ratios": [asdict(ratio) for ratio in study.ratios],
             "skipped": study.list_skipped(),
+            "health": study.list_health(),
         }
         if study.user is not None:
             results |= study.user.to_results()

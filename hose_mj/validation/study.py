@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -87,6 +87,18 @@ class Study:
         if self.committed is None:
             return records
         return [*({**record, "committed": None} for record in records), *self.committed.records]
+
+    def list_health(self) -> list[dict[str, object]]:
+        """For each motion the health of the GEDS hose that came closest."""
+        closest: dict[str, RunResult] = {}
+        for outcome in sorted(self.outcomes, key=lambda outcome: outcome.error):
+            if outcome.health is not None:
+                closest.setdefault(outcome.case, outcome)
+        return [
+            {"case": case, "setting": one.setting.label, **asdict(one.health)}
+            for case, one in closest.items()
+            if one.health is not None
+        ]
 
     def list_skipped(self) -> list[dict[str, object]]:
         """Records of all that was not scored, models that refused a user's hose first."""

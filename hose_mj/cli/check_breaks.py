@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 AGREE = 0.9
 QUICK = 20
+_NOT_SHOWN = ("least", "warnings")  # of an ending: what stands elsewhere in the document
 QUICK_MODELS = ("geds", "flex")
 FINER = 2
 """Control points of geds per one that its world takes by itself, to be as fine as 40 segments."""
@@ -92,7 +93,12 @@ def run(args: Args) -> int:
     ]
     counts = {model: Counter(ending.kind for ending in found) for model, found in endings.items()}
     kinds = {model: dict(sorted(count.items())) for model, count in counts.items()}
-    results = {"kinds": kinds, "pairs": pairs}
+    said = {model: [e.warnings for e in found if e.warnings] for model, found in endings.items()}
+    health = {
+        model: {"sequences": len(found), "warnings": sorted({w for one in found for w in one})}
+        for model, found in said.items()
+    }
+    results = {"kinds": kinds, "pairs": pairs, "health": health}
     return finish("check-breaks", args, checks, results, lambda: _print(kinds, pairs))
 
 
@@ -122,7 +128,7 @@ def _describe(number: int, moves: Sequence[Move], endings: Mapping[str, Ending])
         "moves": [f"{robot} {action}" for robot, action in moves[: last + 1]],
     }
     for model, ending in endings.items():
-        found = {name: value for name, value in asdict(ending).items() if name != "least"}
+        found = {name: value for name, value in asdict(ending).items() if name not in _NOT_SHOWN}
         found["margins"] = [
             {"turn": turn, **ending.least[turn]}
             for turn in sorted({one.turn for one in endings.values()})

@@ -73,6 +73,7 @@ def run(args: Args) -> int:
             "records": study.list_records(),
             "ratios": [asdict(ratio) for ratio in study.ratios],
             "skipped": study.list_skipped(),
+            "health": study.list_health(),
         }
         if study.user is not None:
             results |= study.user.to_results()
@@ -112,6 +113,7 @@ def prepare_cases(args: Args) -> Callable[[Callable[[str], None]], Study]:
     Raises:
         InputError: as in `check_arguments`.
     """
+    from hose_mj.validation.cases import find_trials
     from hose_mj.validation.settings import has_cable
     from hose_mj.validation.study import read_committed_cable, run_study
 
@@ -122,7 +124,8 @@ def prepare_cases(args: Args) -> Callable[[Callable[[str], None]], Study]:
     def measure(advance: Callable[[str], None]) -> Study:
         numerics = not args.cases and "geds" in models
         options: Any = {"quick": args.quick, "seed": args.seed, "with_numerics": numerics}
-        study = run_study(cases, models, **options, advance=advance)
+        trials = find_trials(args.cases) if "geds" in models else ()
+        study = run_study(cases, models, trials, **options, advance=advance)
         study.committed = read_committed_cable(cases) if left_out else None
         return study
 
@@ -130,12 +133,12 @@ def prepare_cases(args: Args) -> Callable[[Callable[[str], None]], Study]:
 
 
 def check_arguments(args: Args) -> tuple[Case, ...]:
-    """Returns the cases to run, those that some chosen model runs.
+    """Returns the cases to run, those that some chosen model runs; none where all are trials.
 
     Raises:
         InputError: an unknown case or model, no case left, a bad seed or folder.
     """
-    from hose_mj.validation.cases import find_cases
+    from hose_mj.validation.cases import find_cases, find_trials
     from hose_mj.validation.settings import has_cable
 
     for model in args.models:
@@ -150,8 +153,8 @@ def check_arguments(args: Args) -> tuple[Case, ...]:
     check_counts(args, seed=0)
     found = find_cases(args.cases)
     cases = tuple(case for case in found if set(case.models) & set(args.models))
-    if not cases:
-        run_with = dict.fromkeys(model for case in found for model in case.models)
+    if not cases and not (find_trials(args.cases) and "geds" in args.models):
+        run_with = dict.fromkeys(model for case in found for model in case.models) or ("geds",)
         raise InputError("models", args.models, f"for these cases one of {', '.join(run_with)}")
     return cases
 

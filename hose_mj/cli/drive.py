@@ -119,7 +119,8 @@ def run(args: Args) -> int:
     print(HELP, file=sys.stderr)
     _show(desk)
     if args.json:
-        results = {"sim_time": desk.world.time, "breaks": desk.breaks}
+        world = desk.world
+        results = {"sim_time": world.time, "breaks": desk.breaks, "health": world.health}
         print_document(make_document("drive", args, results=results))
     return 0
 

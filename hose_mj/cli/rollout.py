@@ -51,6 +51,8 @@ class Args:
     """Show it in a viewer that listens at this URL, as rerun+http://127.0.0.1:9876/proxy."""
     mp4: Path | None = None  # Write a film.
     csv: Path | None = None  # Write a table: a row for each sample.
+    strict: bool = False
+    """Stop with one line and exit status 2 where the health of a geds hose gives a warning."""
     json: bool = False  # Print one JSON document on stdout; messages go to stderr.
     seed: int = 0  # Seed of everything that is left to chance.
 
@@ -76,6 +78,7 @@ class Rollout:
             "break": outcome.broken.to_record() if outcome.broken else None,
             "stalled": outcome.stalled,
             "recording": str(args.save) if args.save else None,
+            "health": self.world.health,
             "wall_s": self.wall_s,
             "recording_overhead": self.overhead,
         }
@@ -229,6 +232,8 @@ def _check(args: Args) -> tuple[str, ...]:
         valid = f"two different ones of {', '.join(WORLDS)}"
         raise InputError("models", " ".join(args.models), valid)
     check_choice("model", args.model, WORLDS)
+    if args.strict and "geds" not in (args.models or (args.model,)):
+        raise InputError("strict", args.strict, "false where no hose is geds, which has a health")
     check_counts(args, seed=0)
     if not 0.0 < args.duration <= 3600.0:
         raise InputError("duration", args.duration, "above 0, at most 3600 (s)")
@@ -255,7 +260,7 @@ def _roll_out(args: Args, scene: Scene, model: str, recording: Recording) -> Rol
     from hose_mj.rollout.episode import run_episode
 
     policy = _choose_policy(args.policy)
-    world = make_world(scene, model)
+    world = make_world(scene, model, **({"strict": args.strict} if model == "geds" else {}))
     monitor = Monitor(world)
     timed = _Timed(recording.make_observers())
     settings = {"scene": args.scene, "model": model, "policy": args.policy, "seed": str(args.seed)}

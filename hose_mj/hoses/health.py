@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from hose_mj.errors import HoseWarning, StepError
@@ -50,6 +51,18 @@ class HealthWatch:
     def resume(self, steps: int, retries: int) -> None:
         """Goes on from counts that a snapshot has brought back."""
         self._retries_before, self._looked = 0, (steps, retries)
+
+    @contextmanager
+    def pause(self) -> Iterator[None]:
+        """Says and refuses nothing within, and forgets what goes on there."""
+        kept = {**vars(self), "_said": dict(self._said)}
+        self._strict = False
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", HoseWarning)
+                yield
+        finally:
+            vars(self).update(kept)
 
     def check_laid(self, strain: float, axial_stiffness: float) -> None:
         """Looks at the largest strain as laid; its force is that of the stiffness (N)."""

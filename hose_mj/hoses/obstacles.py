@@ -96,6 +96,9 @@ class ContactLaw:
             for as many as stand within a radius of each other.
         self_contact: whether the hose may touch itself, with a tenth of both stiffnesses.
         self_friction: Coulomb's coefficient of the hose on itself.
+        friction_profile: stretches of the hose that rub otherwise, under a sleeve or greased: rest
+            arc lengths from and to (m), and the factor on the coefficient of what they touch; 1
+            elsewhere. Where stretches overlap the last one counts.
         slip_speed: of no effect since friction holds; goes on for one release.
 
     Raises:
@@ -109,6 +112,7 @@ class ContactLaw:
     points_per_span: int | None = None
     self_contact: bool = False
     self_friction: float = 0.0
+    friction_profile: tuple[tuple[float, float, float], ...] = ()
     slip_speed: float | None = None
 
     def __post_init__(self) -> None:
@@ -127,6 +131,15 @@ class ContactLaw:
             )
         if self.points_per_span is not None:
             check_count("points_per_span", self.points_per_span, 1, MOST_POINTS)
+        profile = _check_profile(self.friction_profile)
+        object.__setattr__(self, "friction_profile", profile)
+
+    def find_friction_factors(self, arc_lengths: Array) -> Array:
+        """Returns what the profile multiplies friction by at arc lengths (k,), m: (k,)."""
+        factors = np.ones(len(arc_lengths))
+        for begin, end, factor in self.friction_profile:
+            factors[(begin <= arc_lengths) & (arc_lengths <= end)] = factor
+        return factors
 
     def complete(self, spec: HoseSpec) -> ContactLaw:
         """Returns the law of a hose, with the numbers that were left to it."""
@@ -178,6 +191,17 @@ def _check_rotation(rotation: ArrayLike) -> Array:
     ):
         raise InputError("rotation", rotation, "an orthogonal, right-handed (3, 3) matrix")
     return matrix
+
+
+def _check_profile(profile: object) -> tuple[tuple[float, float, float], ...]:
+    valid = "rows of from, to (m, 0 <= from < to) and a factor at or above 0"
+    rows = read_numbers("friction_profile", profile, valid)
+    if rows.size == 0:
+        return ()
+    is_right = rows.ndim == 2 and rows.shape[1] == 3 and np.isfinite(rows).all()
+    if not is_right or (rows < 0.0).any() or (rows[:, 0] >= rows[:, 1]).any():
+        raise InputError("friction_profile", profile, valid)
+    return tuple((begin, end, factor) for begin, end, factor in rows.tolist())
 
 
 def _check_size(kind: str, size: ArrayLike) -> Array:

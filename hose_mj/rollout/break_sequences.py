@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ class Ending:
     text: str  # what happened, in words
     # Per move the least margin of each kind, N for stretch and m for the others.
     least: tuple[dict[str, float], ...]
+    warnings: tuple[str, ...] = ()  # of the hose's health
 
     def agrees(self, other: Ending) -> bool:
         """Says whether both ended alike: the same kind, the same robot out of the same cell."""
@@ -43,7 +44,8 @@ class Ending:
     def from_record(cls, record: dict[str, Any]) -> Ending:
         """The ending whose `asdict` went through JSON."""
         cell = None if record["cell"] is None else tuple(record["cell"])
-        return cls(**{**record, "cell": cell, "least": tuple(record["least"])})
+        lists = {name: tuple(record.get(name, ())) for name in ("least", "warnings")}
+        return cls(**{**record, "cell": cell, **lists})
 
 
 def draw_sequences(seed: int, sequences: int, moves: int, n_robots: int) -> list[list[Move]]:
@@ -109,7 +111,8 @@ def play_all(
         return endings
     monitor = Monitor(make_world(), limits)
     for moves in sequences[len(endings) :]:
-        endings.append(play_sequence(monitor, moves))
+        ending, health = play_sequence(monitor, moves), monitor.world.health
+        endings.append(replace(ending, warnings=health.warnings if health else ()))
         kept.write(endings)
         advance(1)
     return endings

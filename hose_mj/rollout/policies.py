@@ -404,6 +404,10 @@ class Rehearsal:
         return None, trials
 
     def _play(self, script: Script, world: World, monitor: Monitor) -> RehearsedScript:
+        with world.unwatched():
+            return self._play_unwatched(script, world, monitor)
+
+    def _play_unwatched(self, script: Script, world: World, monitor: Monitor) -> RehearsedScript:
         before = world.snapshot()
         begun = world.time
         monitor.reset()

@@ -12,8 +12,9 @@ from importlib.metadata import EntryPoint
 
 from hose_mj.errors import InputError
 from hose_mj.plugins import find_plugins, load_plugin, load_plugins
-from hose_mj.validation import motions, statics
+from hose_mj.validation import leaks, motions, ropes, statics
 from hose_mj.validation.case import Case
+from hose_mj.validation.trial import Trial
 
 CASES: tuple[Case, ...] = (
     *(statics.make_heavy_cantilever(gamma) for gamma in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)),
@@ -37,6 +38,14 @@ CASES: tuple[Case, ...] = (
     motions.make_floor_tow(),
     motions.make_obstacle_drop(),
 )
+
+TRIALS: tuple[Trial, ...] = (
+    Trial("slack-wire", ropes.measure_slack_wire),
+    Trial("whirling-rope", ropes.measure_whirling_rope),
+    Trial("post-pull", leaks.measure_post_pull),
+    Trial("bar-drop", leaks.measure_bar_drop),
+)
+"""What GEDS goes through alone."""
 
 
 @cache
@@ -65,8 +74,15 @@ def list_plugin_cases() -> tuple[Case, ...]:
     return tuple(cases)
 
 
+def find_trials(ids: tuple[str, ...]) -> tuple[Trial, ...]:
+    """Returns the trials of these ids, in the order of `TRIALS`; all without ids."""
+    return tuple(trial for trial in TRIALS if not ids or trial.id in ids)
+
+
 def find_cases(ids: tuple[str, ...]) -> tuple[Case, ...]:
     """Returns the cases of these ids, in the order of `CASES`; a family's name selects all of it.
+
+    Ids of trials select none.
 
     Without ids all of `CASES`; those of other packages (`list_plugin_cases`) run when asked for.
     `InputError` is raised for an id that is neither a case nor a family.
@@ -74,10 +90,13 @@ def find_cases(ids: tuple[str, ...]) -> tuple[Case, ...]:
     if not ids:
         return CASES
     known = CASES
+    trials = [trial.id for trial in TRIALS]
+    ids = tuple(name for name in ids if name not in trials)
     if any(all(name not in (case.id, case.family) for case in CASES) for name in ids):
         known = (*CASES, *list_plugin_cases())
     for name in ids:
         if not any(name in (case.id, case.family) for case in known):
             families = list(dict.fromkeys(case.family for case in known))
-            raise InputError("case", name, f"{', '.join(families)}, or one with its parameter")
+            valid = f"{', '.join([*families, *trials])}, or one with its parameter"
+            raise InputError("case", name, valid)
     return tuple(case for case in known if {case.id, case.family} & set(ids))

@@ -10,9 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import cumulative_simpson, solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, fsolve
-from scipy.special import jn_zeros
+from scipy.special import ellipe, ellipj, ellipk, jn_zeros
 
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.spec import HoseSpec
@@ -207,3 +208,57 @@ def coil_softness(spec: HoseSpec, radius: float, pitch_angle: float) -> float:
     twisting = (radius * cosine) ** 2 / spec.torsional_stiffness
     bending = (radius * sine) ** 2 / spec.bending_stiffness
     return spec.length * (twisting + bending + sine**2 / spec.axial_stiffness)
+
+
+def elastic_catenary(spec: HoseSpec, span: float, weight: float) -> tuple[Array, CubicSpline]:
+    """A rope that stretches and does not resist bending between two points of one height.
+
+    x(s) = H s / EA + (H / w) [asinh(V / H) - asinh((V - w s) / H)], V = w L / 2, likewise z (Irvine
+    1981), with the H for which x(L) is the span.
+
+    Args:
+        spec: of the rope.
+        span: between its ends (m).
+        weight: w, per length at rest (N/m).
+
+    Returns:
+        force (2,) of the far support on it along x and z (N), and places (k, 3), m, by arc length
+        at rest; the near end is at the origin, z is up.
+    """
+    length, stiffness, pull = spec.length, spec.axial_stiffness, 0.5 * weight * spec.length
+
+    def place(s: Array, h: float) -> Array:
+        up = (pull - weight * s) / h
+        x = h * s / stiffness + h / weight * (np.arcsinh(pull / h) - np.arcsinh(up))
+        bent = h / weight * (np.sqrt(1.0 + up**2) - np.sqrt(1.0 + (pull / h) ** 2))
+        return np.stack([x, 0.0 * x, bent - s * (pull - 0.5 * weight * s) / stiffness], axis=-1)
+
+    h = brentq(lambda h: place(np.array(length), h)[0] - span, 1e-6 * pull, stiffness, xtol=1e-14)
+    s = np.linspace(0.0, length, 4001)
+    return np.array([h, pull]), CubicSpline(s, place(s, h))
+
+
+def whirling_rope(k: float, half_span: float) -> tuple[float, float, CubicSpline]:
+    """A rope without weight and stiffness that turns about the line through its ends.
+
+    r(x) = rm sn(K (1 + x / a), k) with rm = 2 k a / (k'^2 K), K and E the complete elliptic
+    integrals, k'^2 = 1 - k^2, a the half span; its length is 2 a (2 E / (k'^2 K) - 1).
+
+    Args:
+        k: modulus, above 0 and below 1; the larger, the more the rope bulges.
+        half_span: a (m).
+
+    Returns:
+        its length (m); the axial force over linear density and squared rate of turning, a^2 / (K
+        k')^2 (m^2); and places (n, 2), m, along and off the axis by arc length.
+    """
+    m = k * k
+    rest, whole = 1.0 - m, float(ellipk(m))
+    x = half_span * np.linspace(-1.0, 1.0, 20001)
+    sn, cn, dn, _ = ellipj(whole * (1.0 + x / half_span), m)
+    slope = 2.0 * k / rest * cn * dn
+    s = cumulative_simpson(np.sqrt(1.0 + slope**2), x=x, initial=0.0)
+    radius = 2.0 * k * half_span / (rest * whole) * sn
+    length = 2.0 * half_span * (2.0 * float(ellipe(m)) / (rest * whole) - 1.0)
+    curve = CubicSpline(s * length / s[-1], np.stack([x, radius], axis=1))
+    return length, half_span**2 / (whole**2 * rest), curve

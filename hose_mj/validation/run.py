@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hose_mj.errors import StepError
+from hose_mj.hoses.health import Health
 from hose_mj.hoses.protocol import Array, Hold, HoseModel
 from hose_mj.validation.case import STIFFENING, Case, Motion, Reference
 from hose_mj.validation.settings import MOST_UNSTABLE, STAGNATION, Grid, Setting, list_static
@@ -39,6 +40,7 @@ class RunResult:
     # Centre lines at those instants, (k, N_DRAWN or N_DRAWN_IN_SPACE, 3).
     points: Array = field(repr=False)
     values: Array = field(repr=False)  # the probe at those instants, (k, q)
+    health: Health | None = None  # of a geds hose in a motion
 
     @property
     def wall_s_per_sim_s(self) -> float | None:
@@ -227,7 +229,9 @@ def _score(case: Case, setting: Setting, reference: Reference) -> RunResult | No
     if not (error < LOST or (may_be_far and np.isfinite(error))):
         return None
     took = (wall, case.motion.duration, _count_fallbacks(hose))
-    return RunResult(case.id, setting, error, "converged", *took, times, points, values)
+    result = RunResult(case.id, setting, error, "converged", *took, times, points, values)
+    result.health = getattr(hose, "health", None)
+    return result
 
 
 def _foresee(case: Case, setting: Setting, grid: Grid) -> str | None:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -24,6 +24,7 @@ from hose_mj.validation.compare import (
 )
 from hose_mj.validation.run import RunResult, Skipped
 from hose_mj.validation.settings import FULL, QUICK
+from hose_mj.validation.trial import Findings, Trial
 from hose_mj.validation.user_hose.case import CASE_ID
 from hose_mj.validation.user_hose.study import UserHoseStudy, run_user_hose_study
 
@@ -58,6 +59,7 @@ class Study:
     checks: list[Check] = field(default_factory=list)  # of the cases, then of the numerics
     ratios: list[Ratio] = field(default_factory=list)  # at equal error
     curves: dict[str, numerics.Curves] = field(default_factory=dict)  # convergence plots by title
+    findings: dict[str, Findings] = field(default_factory=dict)  # of the trials by id
     # Times (s) and energy over its start of the ten-second swing; None if not run.
     energy: tuple[list[float], list[float]] | None = None
     quick: bool = False  # whether the small grid was used
@@ -87,6 +89,18 @@ class Study:
         if self.committed is None:
             return records
         return [*({**record, "committed": None} for record in records), *self.committed.records]
+
+    def list_health(self) -> list[dict[str, object]]:
+        """For each motion the health of the GEDS hose that came closest."""
+        closest: dict[str, RunResult] = {}
+        for outcome in sorted(self.outcomes, key=lambda outcome: outcome.error):
+            if outcome.health is not None:
+                closest.setdefault(outcome.case, outcome)
+        return [
+            {"case": case, "setting": one.setting.label, **asdict(one.health)}
+            for case, one in closest.items()
+            if one.health is not None
+        ]
 
     def list_skipped(self) -> list[dict[str, object]]:
         """Records of all that was not scored, models that refused a user's hose first."""
@@ -119,13 +133,14 @@ def study_user_hose(
 def run_study(
     cases: tuple[Case, ...],
     models: tuple[str, ...],
+    trials: tuple[Trial, ...] = (),
     *,
     quick: bool,
     seed: int,
     with_numerics: bool,
     advance: Callable[[str], None],
 ) -> Study:
-    """Runs the cases and, if wanted, the numerics; `advance` is told what comes next."""
+    """Runs cases, trials and, if wanted, the numerics; `advance` is told what comes next."""
     study = Study(quick=quick)
     grid = QUICK if quick else FULL
     for place, case in enumerate(cases):
@@ -140,6 +155,11 @@ def run_study(
     if "flex" in models and any(case.id == numerics.FLEX_CASE for case in cases):
         advance("stretch of the flex rod")
         study.checks += numerics.check_flex_stretch()
+    for trial in trials:
+        advance(trial.id)
+        found = trial.measure(quick, np.random.default_rng(seed))
+        study.findings[trial.id] = found
+        study.checks += [replace(one, name=f"{trial.id}: {one.name}") for one in found.checks]
     if with_numerics:
         _run_numerics(study, np.random.default_rng(seed), advance)
     return study

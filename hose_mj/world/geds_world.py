@@ -6,6 +6,7 @@ same impulses.
 """
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
 import mujoco
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.geds.hose import GedsHose
+from hose_mj.hoses.health import Health
 from hose_mj.hoses.inputs import check_count
 from hose_mj.hoses.protocol import Array, Hold
 from hose_mj.hoses.spec import check_number
@@ -42,6 +44,7 @@ class GedsWorld(World):
             bodies with implicitfast whatever the scene says.
         compiled_pucks: whether a scene of pucks, robots that are one body on slides each, steps in
             compiled code while no puck is near anything; the motion is the same.
+        strict: whether what `health` warns of is a `StepError` instead, after the step.
 
     Attributes:
         hose: the spline.
@@ -61,6 +64,7 @@ class GedsWorld(World):
         control_points: int | None = None,
         scheme: str = "bdf2",
         compiled_pucks: bool = True,
+        strict: bool = False,
     ) -> None:
         check_scene(scene)
         timestep = scene.timestep if timestep is None else check_number("timestep", timestep)
@@ -75,7 +79,7 @@ class GedsWorld(World):
         model.opt.timestep = timestep
         n = count_control_points(self.n_robots) if control_points is None else control_points
         options: Any = {"control_points": n, "scheme": scheme, "tolerance": 1e-6}
-        options |= {"timestep": model.opt.timestep, "gravity": model.opt.gravity}
+        options |= {"timestep": model.opt.timestep, "gravity": model.opt.gravity, "strict": strict}
         self.hose = GedsHose(scene.spec, **options)
         self.coupling_iterations = 0
         self._start_bodies()
@@ -127,6 +131,15 @@ class GedsWorld(World):
                 self._step_bodies()
                 done += 1
             n_steps -= done
+
+    @property
+    def health(self) -> Health:
+        """See `World.health`."""
+        return self.hose.health
+
+    def unwatched(self) -> AbstractContextManager[None]:
+        """See `World.unwatched`."""
+        return self.hose.unwatched()
 
     def hose_position(self, arc_length: ArrayLike) -> Array:
         """See `World.hose_position`."""
@@ -182,9 +195,11 @@ class GedsWorld(World):
                 f"the step at t = {self.time:.6g} s failed: MuJoCo met numbers that are not "
                 f"finite; try a time step below {self.timestep:g} s or smaller controls"
             )
-        hose.coupling.accept_step()
-        bodies.end()
-        self._contact.update()
+        try:
+            hose.coupling.accept_step()
+        finally:  # where a strict hose complains the step is done all the same
+            bodies.end()
+            self._contact.update()
 
     def _couple(self, held: Sequence[Hold]) -> None:
         """Finds the forces under which the steps of hose and bodies end with both together.

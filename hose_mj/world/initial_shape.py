@@ -1,13 +1,11 @@
 """How a hose lies when a scene starts: at rest between its attachments, round what is there."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from hose_mj.errors import HoseWarning
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.obstacles import Obstacle
 from hose_mj.hoses.protocol import Array
@@ -57,13 +55,11 @@ def relax_initial_shape(
         obstacles=[replace(one, friction=0.0) for one in obstacles],
         scheme="backward-euler",
     )
-    with warnings.catch_warnings():
-        # A guess may be strained: what comes of it is at rest.
-        warnings.simplefilter("ignore", HoseWarning)
+    with hose.unwatched():  # a guess may be strained: what comes of it is at rest
         hose.reset(_draw_guess(hose, places[::-1], arc_lengths[::-1]))
-    for s, place in zip(arc_lengths, places, strict=True):
-        hose.attach(float(s), place)
-    hose.step(round(_DURATION / _STEP))
+        for s, place in zip(arc_lengths, places, strict=True):
+            hose.attach(float(s), place)
+        hose.step(round(_DURATION / _STEP))
     return hose
 
 

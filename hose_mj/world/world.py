@@ -7,6 +7,7 @@ length 0 is at the source, L at the tip.
 """
 
 from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 from warnings import warn
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
+from hose_mj.hoses.health import Health
 from hose_mj.hoses.inputs import check_count, check_vector
 from hose_mj.hoses.protocol import Array
 from hose_mj.hoses.snapshots import undo
@@ -103,6 +105,15 @@ class World(ABC):
 
         Those of the last step; the robots feel the opposite.
         """
+
+    @property
+    def health(self) -> Health | None:
+        """How well the hose's steps went since the last reset; None of MuJoCo's hoses."""
+        return None
+
+    def unwatched(self) -> AbstractContextManager[None]:
+        """Leaves `health` as it is, without a word, while something is tried and taken back."""
+        return nullcontext()
 
     @abstractmethod
     def hose_snapshot(self) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def test_one_static_case_as_a_document_with_its_files(capsys, tmp_path):
     document = json.loads(printed)
     assert list(document) == [
         *("command", "version", "revision", "machine", "seed", "settings", "checks"),
-        *("records", "ratios", "skipped"),
+        *("records", "ratios", "skipped", "health"),
     ]
     assert document["command"] == "compare"
     assert document["seed"] == 0

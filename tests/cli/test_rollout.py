@@ -10,6 +10,7 @@ from hose_learning.study.training import join
 
 from hose_mj.cli import main as cli
 from hose_mj.cli.train import Args, make_training
+from hose_mj.hoses import health
 
 FIELDS = {
     "model": str,
@@ -46,6 +47,25 @@ def test_the_document_of_a_break(capsys):
     assert len(broken["place"]) == 3
     (only,) = document["rollouts"]
     assert all(document[name] == value for name, value in only.items())
+
+
+@pytest.mark.filterwarnings("default::hose_mj.HoseWarning")
+def test_health_is_in_the_document_and_strict_ends_with_status_2(capsys, monkeypatch):
+    words = ("floor_2", "--policy", "random", "--duration", 0.1, "--json")
+    _, out, _ = run(capsys, *words, "--models", "geds", "flex", "--strict")
+    document = json.loads(out)
+    assert [one["health"] is None for one in document["rollouts"]] == [False, True]
+    assert document["health"]["steps"] == document["steps"]
+    assert document["health"]["warnings"] == []
+    monkeypatch.setattr(health, "MOST_RETRIES", -1.0)  # so that the 64th step is not healthy
+    monkeypatch.setattr(health, "EVERY", 10)
+    status, out, err = run(capsys, *words)
+    (said,) = json.loads(out)["health"]["warnings"]
+    assert (status, err) == (0, f"hose-mj: warning: {said}\n")
+    status, out, err = run(capsys, *words, "--strict")
+    assert (status, out, err) == (2, "", f"hose-mj: error: {said}\n")
+    status, _, err = run(capsys, *words, "--model", "flex", "--strict")
+    assert (status, err[:31]) == (2, "hose-mj: error: strict is True;")
 
 
 def test_the_duration_and_the_goal(capsys):

@@ -11,7 +11,7 @@ from hose_mj.errors import InputError
 from hose_mj.hoses.registry import MODELS
 from hose_mj.validation import cases
 from hose_mj.validation.case import read_texts
-from hose_mj.validation.cases import CASES, find_cases
+from hose_mj.validation.cases import CASES, TRIALS, find_cases
 from hose_mj.validation.compare import INEXTENSIBLE
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import FULL, QUICK, Setting, list_ladders, list_static
@@ -57,6 +57,7 @@ def test_ids_are_unique_and_start_with_their_family():
 
 def test_every_text_belongs_to_a_case():
     names = {name for case in CASES for name in (case.id, case.family)}
+    names |= {trial.id for trial in TRIALS}
     assert set(read_texts()) <= names
     assert not any("{}" in case.title for case in CASES)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 from scipy.special import j0
 
+from hose_mj.hoses.spec import HoseSpec
 from hose_mj.validation import reference
 
 LAST_DIGIT = 0.51e-8
@@ -152,3 +154,39 @@ def test_catenary_limits():
 def test_euler_loads():
     assert reference.euler_load("pinned") == pytest.approx(math.pi**2)
     assert reference.euler_load("clamped-free") == pytest.approx(math.pi**2 / 4.0)
+
+
+def test_the_elastic_catenary_is_in_balance_and_tends_to_the_catenary():
+    spec = HoseSpec(
+        length=1.5,
+        axial_stiffness=40.0,
+        bending_stiffness=0.0,
+        linear_density=0.1,
+        outer_radius=1e-3,
+    )
+    (pull, up), curve = reference.elastic_catenary(spec, 1.0, 2.0)
+    assert up == pytest.approx(0.5 * 2.0 * 1.5)
+    np.testing.assert_allclose(curve([0.0, 1.5]), [[0, 0, 0], [1, 0, 0]], atol=1e-12)
+    s = np.linspace(0.01, 1.49, 20)
+    slope = curve(s, 1)
+    force = np.stack([pull + 0.0 * s, 2.0 * s - up], axis=1)  # what each part carries
+    tension = np.linalg.norm(force, axis=1)
+    stretched = force / tension[:, None] * (1.0 + tension / 40.0)[:, None]
+    np.testing.assert_allclose(slope[:, [0, 2]], stretched, atol=1e-8)
+    stiff = replace(spec, axial_stiffness=1e9)
+    (pull, up), curve = reference.elastic_catenary(stiff, 1.0, 2.0)
+    sag, support = reference.catenary(1.5)
+    assert -curve(0.75)[2] / 1.5 == pytest.approx(sag, rel=1e-6)
+    assert np.hypot(pull, up) / 3.0 == pytest.approx(support, rel=1e-6)
+
+
+@pytest.mark.parametrize("k", [0.2, 0.7, 0.9])
+def test_the_whirling_rope_is_in_balance(k):
+    length, unit, curve = reference.whirling_rope(k, 0.5)
+    np.testing.assert_allclose(curve([0.0, length]), [[-0.5, 0], [0.5, 0]], atol=1e-9)
+    s = np.linspace(0.05, 0.95, 19) * length
+    slope = curve(s, 1)
+    np.testing.assert_allclose(np.linalg.norm(slope, axis=1), 1.0, atol=1e-6)
+    # The axial force is the same all along; across, T r' falls by the centripetal force r.
+    across = curve(s, 2)[:, 1] / slope[:, 0] - slope[:, 1] * curve(s, 2)[:, 0] / slope[:, 0] ** 2
+    np.testing.assert_allclose(-unit * across, curve(s)[:, 1], rtol=2e-4)

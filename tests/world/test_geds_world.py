@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from hose_mj.errors import InputError
+from hose_mj.errors import InputError, StepError
+from hose_mj.hoses.geds.contact_law import DEEPEST
 from hose_mj.world.geds_world import GedsWorld
 from hose_mj.world.registry import make_world
 
@@ -52,6 +53,35 @@ def test_robots_of_any_mass_on_a_hose_of_any_stiffness_gain_no_energy(
     growth, gap = fling(write_scene, one, other, stiffness, timestep, scheme, 2.0)
     assert growth < 1.02
     assert gap < 1e-6
+
+
+@pytest.mark.parametrize("compiled_pucks", [True, False])
+def test_a_strict_world_refuses_and_stays_whole(compiled_pucks):
+    world = make_world("floor_2", strict=True, compiled_pucks=compiled_pucks)
+    world.hose.contacts.contact.found[DEEPEST] = 1.0  # as if something had sunk that far
+    with pytest.raises(StepError, match="radii inside"):
+        world.step()
+    assert world.health.steps == 1
+    assert world.hose_position(world.arc_lengths) == pytest.approx(world.site_positions(), abs=1e-6)
+    before = world.snapshot()
+    with world.unwatched():
+        world.step(3)
+        world.restore(before)
+    assert (world.health.steps, world.health.warnings) == (1, ())
+    with pytest.raises(StepError, match="radii inside"):
+        world.step()
+
+
+def test_what_is_tried_and_taken_back_leaves_health_as_it_was(recwarn):
+    world = make_world("floor_2")
+    world.step(2)
+    before, kept = world.snapshot(), world.health
+    with world.unwatched():
+        world.hose.contacts.contact.found[DEEPEST] = 1.0
+        world.step(3)
+        world.restore(before)
+    assert (world.health, len(recwarn)) == (kept, 0)
+    assert make_world("floor_2", "flex").health is None
 
 
 def drive_at_random(world, duration, seed=0):

@@ -64,6 +64,7 @@ def _compute_force(axes, contact, q, g, start, touch, motion, trial):
     stiffness across it.
     """
     gap, normal, _, friction, point = touch
+    friction *= contact.points[q, 5]
     zero = (0.0, 0.0, 0.0)
     scale = 1.0 if g < 0 else contact.geoms[g, SCALE]
     surface = find_surface_velocity(contact, q, g, point)

@@ -57,8 +57,8 @@ class Contact(NamedTuple):
     """What one hose may touch; coordinates of the hose come first, minus its plane's offset.
 
     Attributes:
-        points: the four basis functions at each contact point and its share of arc length (m),
-            (Q, 5), span after span.
+        points: the four basis functions at each contact point, its share of arc length (m) and its
+            factor on friction, (Q, 6), span after span.
         first: number of the first contact point of each span, and how many there are, (S + 1,).
         slopes: what a difference of control points is multiplied by for a control point of r',
             (n - 1,), 1/m.

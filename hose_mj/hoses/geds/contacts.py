@@ -32,6 +32,7 @@ _SELF_SCALE, _SELF_WIDTH = 0.1, 0.1
 """Of the stiffness, and of the radius: what meets along less than a radius is softer."""
 _MOST_SOFT = 512
 """Soft rows of a hose on itself at most, of which the solve costs the square."""
+_FINDINGS = [contact_law.DEEPEST, contact_law.CROSSINGS]
 _SPARE = 64
 """Room for pairs beyond two surfaces at every contact point."""
 
@@ -101,11 +102,16 @@ class ContactSet:
             law: numbers of the contact law; None for the defaults.
 
         Raises:
-            InputError: something that is not an obstacle; the explicit scheme.
+            InputError: something that is not an obstacle; a friction profile longer than the hose;
+                the explicit scheme.
         """
         self._check_implicit()
         if law is not None and not isinstance(law, ContactLaw):
             raise InputError("law", law, "a ContactLaw or None")
+        for stretch in () if law is None else law.friction_profile:
+            if stretch[1] > self._spline.length * (1.0 + 1e-9):
+                valid = f"stretches of the hose, from 0 to {self._spline.length:g} (m)"
+                raise InputError("friction_profile", stretch, valid)
         self._set(check_records("obstacles", obstacles, Obstacle), law or ContactLaw())
 
     def add_floor(self, height: float = 0.0, friction: float = 0.5) -> int:
@@ -359,6 +365,14 @@ class ContactSet:
         self._strands[:] = state["strands"]
         self._rebuild()
 
+    def snapshot_findings(self) -> Array:
+        """Returns `deepest` and `crossings`, which are no part of a snapshot."""
+        return np.array(self._found[_FINDINGS])
+
+    def restore_findings(self, findings: Array) -> None:
+        """Returns to what `snapshot_findings` gave."""
+        self._found[_FINDINGS] = findings
+
     # -- inside ----------------------------------------------------------------------------------
 
     def _check_implicit(self) -> None:
@@ -449,7 +463,7 @@ class ContactSet:
         share = np.full(count + 1, spline.length / count)
         share[[0, -1]] *= 0.5
         self.arc_lengths = at
-        self._points = np.column_stack([values[:, 0], share])
+        self._points = np.column_stack([values[:, 0], share, self.law.find_friction_factors(at)])
         self._first = np.searchsorted(spans, np.arange(n_spans + 1))
         self._memory = np.zeros((count + 1, contact_law.SLOTS, 4))
         self._slides = np.zeros((count + 1, contact_law.SLOTS, 5))

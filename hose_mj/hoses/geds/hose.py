@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import operator
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,7 +130,7 @@ class GedsHose(SplineBody):
             *(scheme, float(timestep), self._state, self._counts, self._watch),
         )
         self.coupling = BodyCoupling(self._dynamics)
-        if check_records("obstacles", obstacles, Obstacle):
+        if check_records("obstacles", obstacles, Obstacle) or contact_law is not None:
             self.set_obstacles(obstacles, contact_law)
         self.reset(lambda s: np.outer(s, np.eye(3)[self._spline.dims[0]]))
 
@@ -399,6 +400,16 @@ class GedsHose(SplineBody):
         steps, _, _, retries = self._counts.tolist()
         found = self.contacts.deepest, self.contacts.crossings
         return self._watch.report(steps, retries, *found, self.measure_least_stretch)
+
+    @contextmanager
+    def unwatched(self) -> Iterator[None]:
+        """Leaves `health` as it is, and says nothing, while something is tried and taken back."""
+        with self._watch.pause():
+            before = self.contacts.snapshot_findings()
+            try:
+                yield
+            finally:
+                self.contacts.restore_findings(before)
 
     def solve_static(self, load_steps: int = 1) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads; velocity becomes zero.

@@ -90,8 +90,14 @@ def plot_series(
     ylabel: str,
     groups: Mapping[str, tuple[ArrayLike, ArrayLike]],
     limits: Mapping[str, float] | None = None,
+    xlabel: str = "time (s)",
+    is_log: bool = False,
 ) -> bytes:
-    """Draws numbers over time, lines named at their ends; `limits` go across with their names."""
+    """Draws numbers over time or what else, lines named at their ends.
+
+    `limits` go across with their names. Where `is_log` both axes are logarithmic, and each point of
+    a line has a mark and its place on the axis.
+    """
     check_some("groups", groups)
     looks = choose_looks(list(groups))
     ends, ink = [], format_hex(LIMIT)
@@ -99,7 +105,9 @@ def plot_series(
         for rank, (label, (times, values)) in enumerate(groups.items()):
             t, y = check_pair(label, times, values)
             width = 1.3 + 1.1 * (len(groups) - 1 - rank) / max(len(groups) - 1, 1)
-            axes.plot(t, y, color=looks[label].color, ls=looks[label].dashes, lw=width)
+            mark = _MARKERS[rank % len(_MARKERS)] if is_log else ""
+            style = {"color": looks[label].color, "ls": looks[label].dashes, "marker": mark}
+            axes.plot(t, y, lw=width, ms=4.5, **style)
             seen = y[np.isfinite(y)]
             last = float(seen[-1]) if len(seen) else 0.0
             ends.append((last, name_model(label), looks[label].ink))
@@ -107,8 +115,12 @@ def plot_series(
             axes.axhline(limit, color=ink, lw=0.9, ls=(0, (4, 3)))
             ends.append((limit, name, ink))
         every = np.concatenate([np.ravel(times) for times, _ in groups.values()])
-        axes.set_xlim(float(every.min()), float(every.max()) or 1.0)
-        axes.set_xlabel("time (s)")
+        if is_log:
+            set_log(axes, x=True, y=True)
+            label_resolutions(axes, every)
+        else:
+            axes.set_xlim(float(every.min()), float(every.max()) or 1.0)
+        axes.set_xlabel(xlabel)
         axes.set_ylabel(ylabel)
         figure.draw_without_rendering()
         label_line_ends(axes, ends)

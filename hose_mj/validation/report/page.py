@@ -20,6 +20,7 @@ from hose_mj.recording.parquet import write_records
 from hose_mj.recording.plots.style import format_seconds
 from hose_mj.recording.rerun.comparison import write_recording
 from hose_mj.validation import settings
+from hose_mj.validation.cases import find_trials
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.report.findings import describe_findings, make_answer_row
 from hose_mj.validation.report.pictures import (
@@ -87,6 +88,7 @@ def make_report(study: Study, document: dict[str, Any], pictures: Pictures, path
         _write_motions(page, study, pictures)
         _write_statics(page, study, pictures)
         _write_committed(page, study)
+        _write_trials(page, study, pictures)
         _write_numerics(page, pictures)
         _write_method(page, settings.QUICK if study.quick else settings.FULL)
     page.write(path)
@@ -258,6 +260,20 @@ def _write_committed(page: Page, study: Study) -> None:
     fold = section.fold(f"All {len(cable.records)} runs")
     rows = [[record[name] for name in columns] for record in cable.records]
     fold.table(["case", "segments", "step (s)", "scheme", "error", "wall s / sim s"], rows)
+
+
+def _write_trials(page: Page, study: Study, pictures: Pictures) -> None:
+    """A part for each trial: its words, pictures and checks."""
+    if not study.findings:
+        return
+    section = write_text(page, "Hard cases")
+    for trial in find_trials(tuple(study.findings)):
+        found = study.findings[trial.id]
+        block = section.subsection(trial.title)
+        block.paragraph(trial.about)
+        for name, plot in found.plots.items():
+            block.figure(pictures[name], plot.title)
+        block.checks(found.checks)
 
 
 def _write_numerics(page: Page, pictures: Pictures) -> None:

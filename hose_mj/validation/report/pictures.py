@@ -17,6 +17,7 @@ from hose_mj.recording.plots.work import Gap, WorkPoint, plot_overview, plot_wor
 from hose_mj.validation.compare import CaseResult, Ratio, find_cheapest
 from hose_mj.validation.run import RunResult
 from hose_mj.validation.study import SHOWN_WITHIN, Study
+from hose_mj.validation.trial import LinePlot, ShapePlot
 
 Pictures = dict[str, bytes]  # PNG by file name without its suffix
 N_SNAPSHOTS = 6  # instants drawn into one picture of shapes
@@ -46,6 +47,8 @@ def draw_all(study: Study) -> Pictures:
                 pictures["overview"] = draw_overview(result, study)
     for family, members in group_statics(study.results).items():
         pictures.update(_draw_statics(family, members))
+    for findings in study.findings.values():
+        pictures.update({name: _draw_finding(plot) for name, plot in findings.plots.items()})
     pictures.update(_draw_numerics(study))
     if study.user is not None and study.user.hose.duration is None and study.outcomes:
         # The rest shape that each model finds where it comes closest.
@@ -267,6 +270,15 @@ def _parameter(result: CaseResult) -> str:
     tail = result.case.id.removeprefix(result.case.family).lstrip("-")
     prefix, text = PARAMETERS.get(result.case.family, ("", ""))
     return text + re.sub(r"^(\d*)pi$", "\\1\u03c0", tail.removeprefix(prefix))
+
+
+def _draw_finding(plot: LinePlot | ShapePlot) -> bytes:
+    if isinstance(plot, LinePlot):
+        return plot_series(
+            plot.title, plot.ylabel, plot.lines, plot.limits, plot.xlabel, plot.is_log
+        )
+    outlines = compute_outlines(plot.obstacles, (0, 2))
+    return plot_shapes(plot.title, plot.shapes, outlines=outlines)
 
 
 def _draw_numerics(study: Study) -> Pictures:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from hose_mj import HoseSpec
+from hose_mj import make_hose as make_model
 from hose_mj.errors import InputError, StepError
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.validation.random_states import N_STEPS, make_random_hose, set_random_obstacles
@@ -90,6 +92,46 @@ def test_on_a_slope_above_the_friction_angle_it_slides(make_hose):
     hose.step(100)
     wanted = 9.81 * (np.sin(angle) - 0.4 * np.cos(angle)) * hose.time
     assert hose.velocity(0.5)[0] @ along == pytest.approx(wanted, rel=2e-3)
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 2.0])
+def test_a_stretch_of_the_hose_rubs_by_its_factor(make_hose, factor):
+    """On an incline: of the weight, .505 (the contact points up to .505 m) rubs as elsewhere."""
+    angle = np.arctan(0.8)
+    hose = make_hose()
+    slope = Obstacle(kind="plane", rotation=turn_about_y(angle), friction=0.3)
+    law = ContactLaw(friction_profile=[(0.0, 1.0, 7.0), (0.0, 0.6, 1.0), (0.505, 1.0, factor)])
+    hose.set_obstacles([slope], law)
+    along, up = slope.rotation[:, 0], slope.rotation[:, 2]
+    hose.reset([REST * up, along + REST * up])
+    hose.step(60)
+    saved = hose.snapshot()
+    rubs = 0.3 * (0.505 + 0.495 * factor)
+    wanted = 9.81 * (np.sin(angle) - rubs * np.cos(angle)) * hose.time
+    assert hose.momentum().linear @ along / 0.1 == pytest.approx(wanted, rel=2e-3)
+    hose.step(5)
+    ended = hose.control_points
+    hose.set_obstacles([slope])
+    hose.restore(saved)
+    hose.step(5)
+    np.testing.assert_array_equal(hose.control_points, ended)
+
+
+@pytest.mark.parametrize(
+    "profile", [[(0.2, 0.1, 1.0)], [(0.0, 1.0, -1.0)], [(0.0, np.nan, 1.0)], [1.0], "grease"]
+)
+def test_a_wrong_friction_profile_is_refused(profile):
+    with pytest.raises(InputError, match=r"friction_profile is .* valid: rows of from, to"):
+        ContactLaw(friction_profile=profile)
+
+
+def test_a_friction_profile_is_one_of_the_spline(make_hose):
+    law = ContactLaw(friction_profile=((0.5, 1.5, 0.0),))
+    with pytest.raises(InputError, match=r"friction_profile .* from 0 to 1 "):
+        make_hose().set_obstacles([FLOOR], law)
+    spec = HoseSpec(length=1.0, axial_stiffness=2e4, bending_stiffness=0.05, linear_density=0.1)
+    with pytest.raises(InputError, match="contact_law"):
+        make_model("cable", spec, contact_law=law)
 
 
 def test_a_belt_carries_the_hose_along(make_hose):

@@ -354,6 +354,7 @@ class ContactSet:
             "capsules": self._capsules.copy(),
             "memory": self._memory.copy(),
             "strands": self._strands.copy(),
+            "sight": float(self._found[contact_law.SIGHT]),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -363,6 +364,7 @@ class ContactSet:
         self._capsules = state["capsules"].copy()
         self._memory[:] = state["memory"]
         self._strands[:] = state["strands"]
+        self._found[contact_law.SIGHT] = state["sight"]
         self._rebuild()
 
     def snapshot_findings(self) -> Array:

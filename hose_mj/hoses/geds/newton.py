@@ -19,6 +19,7 @@ from hose_mj.hoses.geds.contact_law import STAGE, TIMESTEP, TOUCHED, Motion
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
 from hose_mj.hoses.geds.kkt import add_constraint_weight, multiply_row, solve_with_constraints
+from hose_mj.hoses.geds.morison import add_fluid
 from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE
 from hose_mj.hoses.geds.self_contact import add_self_contact
 from hose_mj.hoses.geds.span import LEAST_A
@@ -160,6 +161,9 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     )
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
+    fluid = loads.fluid
+    if len(fluid.current) > 0 and h < np.inf:
+        add_fluid(axes, hose.tables, fluid, h, V, x, work.rate, work.span, work.gradient, work.band)
     contact = loads.contact
     add_self_contact(axes, contact, x, work.rate, h, work.gradient, work.band)
     contact.found[TOUCHED] = 0.0

@@ -12,8 +12,9 @@ from importlib.metadata import EntryPoint
 
 from hose_mj.errors import InputError
 from hose_mj.plugins import find_plugins, load_plugin, load_plugins
-from hose_mj.validation import motions, statics
+from hose_mj.validation import moorings, motions, statics
 from hose_mj.validation.case import Case
+from hose_mj.validation.reference import MOORINGS
 
 CASES: tuple[Case, ...] = (
     *(statics.make_heavy_cantilever(gamma) for gamma in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)),
@@ -29,6 +30,9 @@ CASES: tuple[Case, ...] = (
     *(statics.make_greenhill(pull) for pull in (0.0, 10.0, 100.0)),
     statics.make_helix(),
     statics.make_coil(),
+    *map(moorings.make_mooring, MOORINGS),
+    moorings.make_current(),
+    moorings.make_sinking(),
     motions.make_free_flight(),
     motions.make_released_rod(),
     motions.make_taut_pull(),

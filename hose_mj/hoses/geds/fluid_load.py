@@ -34,29 +34,24 @@ class FluidLoad:
 
     def __init__(self, spline: Spline, spec: HoseSpec, tables: Tables, fluid: Fluid | None) -> None:
         self._spline, self._tables, self._fluid = spline, tables, fluid
-        n_spans = 0 if fluid is None else len(tables.first)
-        current, self._added = np.zeros((n_spans, 3, 3)), 0.0
-        self.morison = Morison(current, 0.0, 0.0, 0.0)
-        self.is_field = fluid is not None and callable(fluid.velocity)
-        self.moves = self.is_field
+        self._windows = np.arange(len(tables.first))[:, None] + np.arange(4)
+        self._share = (tables.weights * tables.span_length)[:, None] * tables.value
+        self._displaced = 0.0
+        self.morison = Morison(np.zeros((0, 3, 3)), 0.0, 0.0, 0.0)
+        self.moves = self.is_field = fluid is not None and callable(fluid.velocity)
         if fluid is None:
             return
-        half = fluid.density * spec.outer_radius
-        area = np.pi * spec.outer_radius**2
-        self._displaced = fluid.density * area
-        coefficients = half * fluid.normal_drag, half * np.pi * fluid.tangential_drag
-        self.morison = Morison(current, *coefficients, fluid.added_mass * self._displaced)
-        nodes = 0.5 + 0.5 * np.polynomial.legendre.leggauss(3)[0]
-        self._share = (tables.weights * tables.span_length)[:, None] * tables.value
-        self._arc_lengths = np.add.outer(np.arange(n_spans), nodes).ravel() * tables.span_length
+        current, radius = np.zeros((len(tables.first), 3, 3)), spec.outer_radius
+        self._displaced = fluid.density * np.pi * radius**2  # kg/m
+        across = fluid.density * radius * fluid.normal_drag
+        along = fluid.density * radius * np.pi * fluid.tangential_drag
+        self.morison = Morison(current, across, along, fluid.added_mass * self._displaced)
         if not self.is_field:
-            self._set(fluid.compute_velocities(np.zeros((3 * n_spans, 3))))
+            self._set(fluid.compute_velocities(current.reshape(-1, 3)))
             self.moves = bool(np.any(current))
 
     def compute_buoyancy(self, gravity: Array) -> Array:
         """Generalised force of the fluid's pressure on the control points, flat (n d,), N."""
-        if self._fluid is None:
-            return np.zeros(self._spline.size)
         knots = self._spline.knots
         share = (knots[4:] - knots[:-4]) / 4.0  # the integral of N_i
         return -self._displaced * self._spline.from_world(np.outer(share, gravity))
@@ -68,8 +63,9 @@ class FluidLoad:
             InputError: velocities that are not finite, of another shape or out of the hose's plane.
         """
         if self.is_field and self._fluid is not None:
-            places = self._spline.evaluate(self._arc_lengths, x) + self._spline.offset
-            self._set(self._fluid.compute_velocities(places))
+            windows = self._spline.to_world(x)[self._windows]
+            places = np.einsum("sgi,sic->sgc", self._tables.value, windows).reshape(-1, 3)
+            self._set(self._fluid.compute_velocities(places + self._spline.offset))
 
     def compute_drag(self, x: Array) -> tuple[Array, Array]:
         """Drag on a hose at rest at x, flat: generalised force (n d,), N, and its derivative by x.
@@ -108,7 +104,8 @@ class FluidLoad:
         return whole.reshape(n * size, n * size)
 
     def _set(self, velocities: Array) -> None:
-        for velocity in velocities:
+        fastest = np.abs(velocities).argmax(axis=0)
+        for velocity in velocities[fastest]:
             self._spline.check_in_plane("velocity of the fluid", velocity, 0.0)
         d, current = self._spline.dimension, self.morison.current
         current[..., :d] = velocities.reshape(*current.shape[:2], 3)[..., self._spline.dims]

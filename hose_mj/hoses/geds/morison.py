@@ -77,22 +77,38 @@ def add_fluid(axes, tables, fluid, h, V, x, rate, p, gradient, band):
                 w[c] -= w_t * t[c]
                 speed += u[c] * u[c]
             speed = np.sqrt(speed)
-            # D = flat P + steep un un^T + slide t t^T, with un across the hose.
+            # Derivative by x: flat P + steep un un^T + slide t t^T, with un across the hose.
             flat = fluid.across * speed / h + fluid.added / (h * h)
             steep = fluid.across / (speed * h) if speed > 0.0 else 0.0
             slide = 2.0 * fluid.along * abs(u_t) / h
             share = tables.weights[g] * tables.span_length
-            for i in range(4):
-                weight = share * tables.value[e, g, i]
-                for c1 in range(n_places):
-                    force = fluid.across * speed * u[c1] + fluid.along * abs(u_t) * u_t * t[c1]
-                    gradient[(e + i) * d + c1] += weight * (force + fluid.added * w[c1])
-                    for j in range(i + 1):
-                        for c2 in range(n_places if j < i else c1 + 1):
-                            D = (slide - flat) * t[c1] * t[c2] + steep * u[c1] * u[c2]
-                            D += flat if c1 == c2 else 0.0
-                            D *= weight * tables.value[e, g, j]
-                            band[(e + j) * d + c2, (i - j) * d + c1 - c2] += D
+            for c1 in range(n_places):
+                force = fluid.across * speed * u[c1] + fluid.along * abs(u_t) * u_t * t[c1]
+                p.force[g, 0, c1] = share * (force + fluid.added * w[c1])
+                for c2 in range(c1 + 1):
+                    D = (slide - flat) * t[c1] * t[c2] + steep * u[c1] * u[c2]
+                    p.stiffness[c1, c2, g] = share * (D + (flat if c1 == c2 else 0.0))
+        _scatter(axes, tables.value, e, p, gradient, band)
+
+
+@kernel
+def _scatter(axes, value, e, p, gradient, band):
+    """Adds the forces at a span's Gauss points and their derivatives to gradient and band."""
+    d = len(axes)
+    for i in range(4):
+        n0, n1, n2 = value[e, 0, i], value[e, 1, i], value[e, 2, i]
+        for c in range(len(axes[:3])):
+            f = n0 * p.force[0, 0, c] + n1 * p.force[1, 0, c] + n2 * p.force[2, 0, c]
+            gradient[(e + i) * d + c] += f
+        for j in range(i + 1):
+            m0, m1, m2 = n0 * value[e, 0, j], n1 * value[e, 1, j], n2 * value[e, 2, j]
+            for c1 in range(len(axes[:3])):
+                for c2 in range(c1 + 1):
+                    D = p.stiffness[c1, c2]
+                    weight = m0 * D[0] + m1 * D[1] + m2 * D[2]
+                    band[(e + j) * d + c2, (i - j) * d + c1 - c2] += weight
+                    if j < i and c2 < c1:
+                        band[(e + j) * d + c1, (i - j) * d + c2 - c1] += weight
 
 
 def compute_drag(fluid: Morison, tables: Tables, points: Array) -> tuple[Array, Array, Array]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from hose_mj.constraints.limits import Limits
     from hose_mj.constraints.monitor import Monitor
     from hose_mj.errors import HoseError, HoseWarning, InputError, StepError
+    from hose_mj.hoses.fluid import Fluid
     from hose_mj.hoses.health import Health
     from hose_mj.hoses.obstacles import ContactLaw, Obstacle
     from hose_mj.hoses.protocol import Hold, HoseModel
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ContactLaw",
     "Fitting",
+    "Fluid",
     "Health",
     "Hold",
     "HoseError",
@@ -56,6 +58,7 @@ __all__ = [
 _HOMES = {
     "ContactLaw": "hose_mj.hoses.obstacles",
     "Fitting": "hose_mj.hoses.spec",
+    "Fluid": "hose_mj.hoses.fluid",
     "Health": "hose_mj.hoses.health",
     "Hold": "hose_mj.hoses.protocol",
     "HoseError": "hose_mj.errors",

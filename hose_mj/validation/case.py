@@ -94,6 +94,7 @@ class Case:
     promised: Mapping[int, float] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()  # what the hose may touch
     contact_law: ContactLaw | None = None  # of GEDS; None for its defaults
+    options: Mapping[str, Any] = field(default_factory=dict)  # of GEDS, beside those
     # Computes the motion's truth where that is not the converged limit of GEDS.
     reference: Callable[[], Reference] | None = None
     uncertainty: float = 1e-4  # how far two resolutions of the reference may differ, of L

@@ -12,8 +12,9 @@ from importlib.metadata import EntryPoint
 
 from hose_mj.errors import InputError
 from hose_mj.plugins import find_plugins, load_plugin, load_plugins
-from hose_mj.validation import leaks, motions, ropes, statics
+from hose_mj.validation import leaks, moorings, motions, ropes, statics
 from hose_mj.validation.case import Case
+from hose_mj.validation.reference import MOORINGS
 from hose_mj.validation.trial import Trial
 
 CASES: tuple[Case, ...] = (
@@ -30,6 +31,9 @@ CASES: tuple[Case, ...] = (
     *(statics.make_greenhill(pull) for pull in (0.0, 10.0, 100.0)),
     statics.make_helix(),
     statics.make_coil(),
+    *map(moorings.make_mooring, MOORINGS),
+    moorings.make_current(),
+    moorings.make_sinking(),
     motions.make_free_flight(),
     motions.make_released_rod(),
     motions.make_taut_pull(),

@@ -262,3 +262,81 @@ def whirling_rope(k: float, half_span: float) -> tuple[float, float, CubicSpline
     length = 2.0 * half_span * (2.0 * float(ellipe(m)) / (rest * whole) - 1.0)
     curve = CubicSpline(s * length / s[-1], np.stack([x, radius], axis=1))
     return length, half_span**2 / (whole**2 * rest), curve
+
+
+@dataclass(frozen=True)
+class MooringLine:
+    """A line without bending stiffness from an anchor on the sea bed, at the origin, to a fairlead.
+
+    Friction holds the part on the bed back from sliding towards the fairlead, all along it.
+    """
+
+    span: float  # m, to the fairlead along x
+    height: float  # m, to the fairlead
+    length: float  # at rest (m)
+    axial_stiffness: float  # N
+    weight: float  # per length at rest, in water (N/m)
+    friction: float  # Coulomb's coefficient of the bed
+    slope: float  # of the bed, rising towards the fairlead (rad)
+    horizontal: float  # force at the fairlead (N)
+    vertical: float  # the same
+    anchor: float  # force at the anchor (N)
+    rests: float  # length at rest on the bed (m); 0 where there is none
+
+
+_LONG = (848.67, 250.0, 902.2, 384.243e6, 698.094)
+_SHORT = (8.0, 3.0, 8.8, 1e4, 5.0)
+MOORINGS = {
+    "long": MooringLine(*_LONG, 0.0, 0.0, 736938.32, 535727.45, 736938.32, 134.7855),
+    "long-rough": MooringLine(*_LONG, 1.0, 0.0, 737375.92, 535869.34, 643424.86, 134.5823),
+    "short": MooringLine(*_SHORT, 0.0, 0.0, 38.175784, 36.919238, 38.175784, 1.416152),
+    "short-rough": MooringLine(*_SHORT, 0.5, 0.0, 38.198937, 36.928551, 34.663212, 1.414290),
+    "slack": MooringLine(
+        *(9.0, 3.0, 10.0, 300.0, 5.0), 1.0, 0.0, 12.172664, 23.278997, 0.0, 5.344201
+    ),
+    "slope": MooringLine(
+        *_SHORT, 0.0, math.radians(5.0), 31.030032, 32.372963, 29.898590, 2.868363
+    ),
+    "slope-rough": MooringLine(
+        *_SHORT, 0.5, math.radians(5.0), 31.138345, 32.425275, 22.888768, 2.859795
+    ),
+    "hanging": MooringLine(
+        *(8.0, 3.0, 10.0, 1e4, 5.0), 0.0, 0.0, 18.934319, 34.544744, 24.441189, 0.0
+    ),
+}
+"""Lines by name, computed with MoorPy 1.3 (function `catenary`, tolerance 1e-11) and a shooting
+code of our own, which agrees to 1e-7. "slope-rough" is of the latter: MoorPy's friction does not
+count that the bed carries the weight times the cosine of its slope."""
+
+
+def lay_slack_line(line: MooringLine, pull: float, s: Array) -> Array:
+    """Returns places (k, 3), m, of a mooring line at arc lengths s (k,), drawn by a smaller pull.
+
+    It is inextensible: straight on the bed, then a catenary of horizontal force `pull` (N) up to
+    the height of the fairlead.
+    """
+    start = pull * math.tan(line.slope)
+
+    def rise(up: Array) -> Array:
+        return (np.hypot(pull, start + line.weight * up) - math.hypot(pull, start)) / line.weight
+
+    def miss(up: float) -> float:
+        return float((line.length - up) * math.sin(line.slope) + rise(np.array(up)) - line.height)
+
+    touchdown = line.length - float(brentq(miss, 0.0, line.length))
+    flat, up = np.minimum(s, touchdown), np.maximum(s - touchdown, 0.0)
+    turn = np.arcsinh((start + line.weight * up) / pull) - math.asinh(start / pull)
+    x = flat * math.cos(line.slope) + pull / line.weight * turn
+    return np.stack([x, 0.0 * s, flat * math.sin(line.slope) + rise(up)], axis=1)
+
+
+def stream_slope(weight: float, drag: float) -> float:
+    """Cosine of the angle to a current at which a line hangs straight in it.
+
+    Across the line its weight w and drag D sin^2 are in balance: w cos = D sin^2.
+
+    Args:
+        weight: w, per length in the fluid (N/m).
+        drag: D, of a line across the current (N/m).
+    """
+    return (math.hypot(weight, 2.0 * drag) - weight) / (2.0 * drag)

@@ -67,6 +67,8 @@ class Setting:
             options.update(obstacles=case.obstacles)
             if entry.contact_law:
                 options.update(contact_law=case.contact_law)
+        if self.model == "geds":
+            options.update(case.options)
         return make_hose(self.model, case.spec, **options)
 
 

@@ -67,8 +67,7 @@ def test_the_published_ids_are_there():
         *("heavy-cantilever", "tip-load", "end-moment", "frequencies", "hanging-chain"),
         *("catenary", "euler-buckling", "released-rod", "taut-pull", "free-flight"),
         *("bend-45", "ring-twist", "greenhill", "helix", "coil"),
-        *("capstan", "floor-tow", "obstacle-drop"),
-        *("capstan", "floor-tow", "obstacle-drop"),
+        *("mooring", "capstan", "floor-tow", "obstacle-drop"),
     }
     assert wanted <= {case.family for case in CASES}
     ids = {case.id for case in CASES}

@@ -25,6 +25,7 @@ from hose_mj.hoses.geds.contact import add_contact
 from hose_mj.hoses.geds.contact_law import Motion
 from hose_mj.hoses.geds.integrators import RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
+from hose_mj.hoses.geds.morison import add_fluid
 from hose_mj.hoses.geds.self_contact import accept_self_contact, add_self_contact
 from hose_mj.hoses.geds.twist import accept_twist
 from hose_mj.hoses.health import HealthWatch
@@ -53,6 +54,11 @@ _ROUNDING = 1e-12
 _SLOW = 1e-2
 """Of EI / (rho L^4): the square of a rate below which growth counts as none (1/s^2); the slowest
 bending motion of a clamped hose is 35 times as fast."""
+_MOST_BALANCES = 100
+"""Of a current's drag with the hose's shape, at half a radian a span each."""
+_BALANCED = 1e-9
+"""Of the move of a control point, in lengths, that drag and shape still ask of each other: dead
+loads are met to a tenth of it."""
 _AIDS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Bending stiffness lent to a chain in statics, in loads times length squared."""
 
@@ -118,12 +124,18 @@ class Dynamics:
         first: np.ndarray = _NO_ROWS,
     ) -> int:
         """Runs the compiled entry, `stepping.advance`; returns its verdict."""
+        if self.loads.fluid.is_field and what != stepping.ACCEPT:
+            for _ in range(n_steps - 1):
+                verdict = self.run(what, 1, masses, first)
+                if verdict != records.DONE:
+                    return verdict
+            n_steps = min(n_steps, 1)
+            self.loads.fluid.update(self.state.x)
         rows, loads = self.constraints.rows, self.loads.loads
         parts = (rows, loads, masses, first)
         if any(a is not b for a, b in zip(parts, self._packed_of, strict=True)):
             self._pack(parts)
-        verdict: int = self._enter(self._packed.address, what, self._code, n_steps)
-        return verdict
+        return int(self._enter(self._packed.address, what, self._code, n_steps))
 
     def _pack(self, parts: tuple[Any, ...]) -> None:
         """Puts all that a step reads to where compiled code finds it."""
@@ -151,10 +163,61 @@ class Dynamics:
         """Moves the state to equilibrium by Newton's iteration, capped by the tangents' turn.
 
         The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
+        A current's drag grows after them, in as many steps.
 
         Raises:
             StepError: no equilibrium was found; the state before is kept.
         """
+        if not self.loads.fluid.moves:
+            self._settle(load_steps)
+            return
+        rows = self.constraints.rows
+        twist = rows.twist.accepted, rows.twist.spin
+        changing = (*twist, rows.before, rows.after, rows.multipliers, *self.state)
+        before = [part.copy() for part in changing]
+        while True:
+            try:
+                self._meet_current(load_steps)
+                return
+            except StepError:
+                _copy(before, changing)
+                load_steps *= 2
+                if load_steps > MOST_LOAD_STEPS:
+                    raise
+            finally:
+                self.loads.hold_drag(np.zeros_like(self.state.x))
+
+    def _meet_current(self, load_steps: int) -> None:
+        """Settles under loads and drag; raises `StepError` where the shape does not come to rest.
+
+        For a dead drag f the hose settles at x(f). Wanted is f = drag(x(f)): Newton's iteration on
+        f, whose matrix K - drag' is not symmetric.
+        """
+        length = self.hose.tables.span_length * len(self.hose.tables.first)
+        fluid, held = self.loads.fluid, np.zeros_like(self.state.x)
+        size, slopes = len(held), self.loads.contacts.contact.slopes[:, None]
+        for share in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
+            for _ in range(_MOST_BALANCES):
+                self.loads.hold_drag(held)
+                self._settle(load_steps)
+                drag, slope = fluid.compute_drag(self.state.x)
+                small = self.linearize(np.inf)
+                rows, none = small.constraints, np.zeros((len(small.constraints),) * 2)
+                # What no force resists, a turn about the hose's own axis, does not move.
+                stiffness = small.stiffness + np.diag(_ROUNDING * np.diag(small.stiffness))
+                matrix = np.block([[stiffness - share * slope, rows.T], [rows, none]])
+                residual = np.concatenate([share * drag - held, np.zeros(len(rows))])
+                move = np.linalg.solve(matrix, residual)[:size]
+                if np.abs(move).max() <= _BALANCED * length:
+                    break
+                turn = np.abs(slopes * np.diff(move.reshape(-1, len(self.axes))[:, :3], axis=0))
+                part = min(1.0, _STATIC_TURN / turn.max())
+                held = held + part * (share * (drag + slope @ move) - held)
+            else:
+                raise StepError("no static equilibrium in the current was found")
+
+    def _settle(self, load_steps: int) -> None:
+        """`solve_static` for dead loads."""
         rows, work = self.constraints.rows, self.make_work()
         verdict, found = records.NOT_CONVERGED, self.state.x
         strands = self.loads.contacts.contact.strands
@@ -270,11 +333,12 @@ class Dynamics:
         n_soft = self.loads.contacts.n_soft
         return records.make_work(n_points, len(self.axes), self.constraints.n_rows, n_soft)
 
-    def build_tangent(self) -> records.Work:
+    def build_tangent(self, step: float = _ENDLESS) -> records.Work:
         """Returns work arrays with dU + C v less moments and contact in the gradient.
 
-        Its derivative is in the band. Forces, gravity, inertia and constraints are left out; so are
-        the derivative of damping and friction and the rank-one terms of the twist.
+        Its derivative is in the band. Forces, gravity, inertia, constraints and drag are left out;
+        so are the derivative of damping and friction and the rank-one terms of the twist. In an
+        infinite step nothing rubs.
         """
         work, rows, loads = self.make_work(), self.constraints.rows, self.loads.loads
         x = self.state.x
@@ -286,16 +350,26 @@ class Dynamics:
         )
         newton.add_moments(self.axes, loads, True, x, work)
         # Within a step without end nothing changes its velocity, but what slides still rubs.
-        motion = Motion(work.rate, x, x, _ENDLESS, 0.0, 0.0)
+        motion = Motion(work.rate, x, x, step, 0.0, 0.0)
         add_contact(self.axes, loads.contact, x, motion, True, work.gradient, work.band)
         if self.loads.contacts.law.self_contact:
             work.start[:] = x
             add_self_contact(self.axes, loads.contact, x, _ENDLESS, work)
         return work
 
-    def linearize(self) -> Linearization:
+    def add_fluid(self, acceleration: Array, work: records.Work) -> None:
+        """Adds drag and added mass at accelerations (n d,), m/s^2, to the gradient in `work`."""
+        fluid, (x, v) = self.loads.fluid, self.state[:2]
+        if len(fluid.morison.current) > 0:
+            fluid.update(x)
+            add_fluid(
+                *(self.axes, self.hose.tables, fluid.morison, 1.0, v - acceleration, x, v),
+                *(work.span, work.gradient, work.band),
+            )
+
+    def linearize(self, step: float = _ENDLESS) -> Linearization:
         """Returns dense mass, stiffness (of `build_tangent`, with the twist) and constraints."""
-        work, rows = self.build_tangent(), self.constraints.rows
+        work, rows = self.build_tangent(step), self.constraints.rows
         size, width = len(self.state.x), 4 * len(self.axes)
         stiffness = mechanics.make_dense(work.band, size, width)
         for row, compliance in zip(rows.twist.rows, rows.twist.compliance, strict=True):
@@ -306,6 +380,7 @@ class Dynamics:
         work.band[:] = 0.0
         newton.add_mass(self.axes, self.hose, 1.0, work.band)
         mass = mechanics.make_dense(work.band, size, width)
+        mass += self.loads.fluid.compute_added_mass(self.state.x)
         return Linearization(mass, stiffness, mechanics.make_dense_rows(rows, size, width))
 
 

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import HoseWarning, InputError
+from hose_mj.hoses.fluid import Fluid, check_fluid
 from hose_mj.hoses.geds import integrators, mechanics, records
 from hose_mj.hoses.geds.body import FOLDED, SplineBody
 from hose_mj.hoses.geds.body_coupling import BodyCoupling
 from hose_mj.hoses.geds.contacts import ContactSet
 from hose_mj.hoses.geds.dynamics import MOST_LOAD_STEPS, Dynamics
+from hose_mj.hoses.geds.fluid_load import FluidLoad
 from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.material_frames import check_rotation
@@ -78,10 +80,12 @@ class GedsHose(SplineBody):
         max_iterations: Newton iterations in a stage before the careful fallback.
         obstacles: what the hose may touch; `set_obstacles` changes it.
         contact_law: numbers of the contact; None for the defaults.
+        fluid: water or air about the hose, whose weight then counts less what it displaces; None
+            for none.
         strict: whether what `health` warns of is a `StepError` instead.
 
     Attributes:
-        spec, gravity, scheme: as given.
+        spec, gravity, scheme, fluid: as given.
         contacts: obstacles and contact forces.
         coupling: steps with bodies that feel the hose.
 
@@ -104,6 +108,7 @@ class GedsHose(SplineBody):
         max_iterations: int = 20,
         obstacles: Sequence[Obstacle] = (),
         contact_law: ContactLaw | None = None,
+        fluid: Fluid | None = None,
         strict: bool = False,
     ) -> None:
         check_spec(spec)
@@ -112,7 +117,8 @@ class GedsHose(SplineBody):
         check_number("force_tolerance", force_tolerance)
         check_count("max_iterations", max_iterations, 1)
         has_theta = mechanics.check_twist(twist, spec, plane)
-        mechanics.check_scheme(scheme, spec, has_theta)
+        self.fluid = check_fluid(fluid)
+        mechanics.check_scheme(scheme, spec, has_theta, fluid is not None)
         spline = Spline(control_points, spec.length, plane, has_theta)
         super().__init__(spec, spline, gravity, twist == "frenet")
         self.scheme = scheme
@@ -122,7 +128,9 @@ class GedsHose(SplineBody):
             move, turn_length, max_iterations, np.inf, False, 0.0, force_tolerance
         )
         self.contacts = ContactSet(spline, spec, move, float(timestep), self._state, scheme)
-        self._loads = LoadSet(spline, self._weight, self.contacts)
+        load = FluidLoad(spline, spec, self._hose.tables, self.fluid)
+        self._weight += load.compute_buoyancy(self.gravity)
+        self._loads = LoadSet(spline, self._weight, self.contacts, load)
         self._counts = np.zeros(4, dtype=np.int64)
         self._watch = HealthWatch(spec.length, strict)
         self._dynamics = Dynamics(
@@ -417,8 +425,8 @@ class GedsHose(SplineBody):
         The loads grow in `load_steps` equal steps, in two, four, ... times as many if that fails.
         An equilibrium that is unstable or folded is said by a `HoseWarning` too. It counts as
         unstable where a disturbance grows faster than some hundredth of the slowest bending motion.
-        A moment that acts in space has no energy: the symmetric part of the stiffness decides then,
-        which may err, and no warning is given.
+        A moment that acts in space has no energy, nor has a current's drag, which is left out: the
+        symmetric part of the stiffness decides then, which may err, and no warning is given.
 
         Raises:
             InputError: load_steps is not a whole number from 1 to 64; a closed loop that nothing
@@ -435,7 +443,8 @@ class GedsHose(SplineBody):
         self.contacts.forget()
         least = self.measure_least_stretch()
         found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
-        if found.is_folded or self._spline.dimension == 2 or not self._loads.list_moments():
+        turns = self._spline.dimension == 3 and bool(self._loads.list_moments())
+        if found.is_folded or not (turns or self._loads.fluid.moves):
             found.warn(stacklevel=3)
         return found
 
@@ -460,7 +469,9 @@ class GedsHose(SplineBody):
         wanted = check_rows("acceleration", acceleration, self._spline.n_control_points)
         work = self._dynamics.build_tangent()
         drag = self._hose.drag_rate * self._state.v
-        inertia = self._multiply_mass(self._spline.from_world(wanted) + drag)
+        flat = self._spline.from_world(wanted)
+        self._dynamics.add_fluid(flat, work)
+        inertia = self._multiply_mass(flat + drag)
         internal = work.gradient[: self._spline.size]
         return self._spline.to_world(inertia + internal - self._loads.loads.force)
 

@@ -1,4 +1,4 @@
-"""`LoadSet`: gravity, point forces and point moments on a hose, as the kernels read them."""
+"""`LoadSet`: gravity, fluid, point forces and point moments on a hose, as the kernels read them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from hose_mj.hoses.geds import records
 from hose_mj.hoses.geds.contacts import ContactSet
+from hose_mj.hoses.geds.fluid_load import FluidLoad
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.inputs import check_arc_lengths, check_rows, check_vector
 from hose_mj.hoses.protocol import Array
@@ -16,20 +17,25 @@ from hose_mj.hoses.snapshots import take_array, take_list
 
 
 class LoadSet:
-    """All dead loads of one hose; gravity never leaves.
+    """All loads of one hose; gravity and a fluid never leave.
 
     Args:
         spline: the hose's geometry.
-        weight: generalised force of gravity on the control points, flat (n d,), N.
+        weight: generalised force of gravity and buoyancy on the control points, flat (n d,), N.
         contacts: what may be touched; kept.
+        fluid: kept.
     """
 
     _loads: records.Loads
 
-    def __init__(self, spline: Spline, weight: Array, contacts: ContactSet) -> None:
+    def __init__(
+        self, spline: Spline, weight: Array, contacts: ContactSet, fluid: FluidLoad
+    ) -> None:
         self._spline = spline
         self._weight = weight
         self.contacts = contacts
+        self.fluid = fluid
+        self._held = np.zeros_like(weight)
         self.clear()
 
     @property
@@ -55,6 +61,11 @@ class LoadSet:
         places = check_arc_lengths(arc_lengths, self._spline.length)
         vectors = check_rows("forces", forces, len(places))
         self._push = self._spline.from_world(self._spline.compute_jacobian(places) @ vectors)
+        self._rebuild()
+
+    def hold_drag(self, force: Array) -> None:
+        """Sets the drag (n d,), N, that statics take for a dead load; zero outside them."""
+        self._held = force
         self._rebuild()
 
     def add_force(self, arc_length: float, force: ArrayLike) -> None:
@@ -113,7 +124,7 @@ class LoadSet:
 
     def _rebuild(self) -> None:
         d, n_dof = self._spline.dimension, self._spline.n_dof
-        force = self._weight + self._push
+        force = self._weight + self._push + self._held
         for place, vector in self._forces:
             starts, values = self._spline.compute_basis(np.array([place]))
             window = force[starts[0] : starts[0] + 4 * n_dof].reshape(4, n_dof)
@@ -127,4 +138,5 @@ class LoadSet:
             else:
                 moments[k, 0] = vector @ self._spline.normal
         values = np.ascontiguousarray(values[:, :2])
-        self._loads = records.Loads(force, starts, values, moments, self.contacts.contact)
+        acting = self.contacts.contact, self.fluid.morison
+        self._loads = records.Loads(force, starts, values, moments, *acting)

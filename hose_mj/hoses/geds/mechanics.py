@@ -44,13 +44,14 @@ def check_twist(form: str | None, spec: HoseSpec, plane: str | None) -> bool:
     return form in ("theta", "frenet") or not spec.is_isotropic
 
 
-def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool) -> None:
+def check_scheme(scheme: str, spec: HoseSpec, has_theta: bool, has_fluid: bool) -> None:
     """Raises `InputError` for an unknown scheme, or one that cannot do what the hose needs."""
     check_choice("scheme", scheme, integrators.SCHEMES)
     if scheme == "verlet" and has_theta:
         raise InputError("scheme", scheme, "an implicit scheme for a hose with theta")
-    if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0):
-        raise InputError("scheme", scheme, "an implicit scheme for a hose with damping or drag")
+    if scheme == "verlet" and (spec.damping_time > 0.0 or spec.drag > 0.0 or has_fluid):
+        valid = "an implicit scheme for a hose with damping, with drag or in a fluid"
+        raise InputError("scheme", scheme, valid)
 
 
 def make_constants(spec: HoseSpec, knots: Array, frenet: bool = False) -> records.Hose:

@@ -19,6 +19,7 @@ from hose_mj.hoses.geds.contact_law import SELF_SCALE, STAGE, TIMESTEP, TOUCHED,
 from hose_mj.hoses.geds.energy import assemble
 from hose_mj.hoses.geds.frames import shift_clamps
 from hose_mj.hoses.geds.kkt import add_constraint_weight, multiply_row, solve_with_constraints
+from hose_mj.hoses.geds.morison import add_fluid
 from hose_mj.hoses.geds.packing import unpack
 from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE
 from hose_mj.hoses.geds.self_contact import add_self_contact, limit_move, measure_self_left
@@ -161,6 +162,9 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     )
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
+    fluid = loads.fluid
+    if len(fluid.current) > 0 and h < np.inf:
+        add_fluid(axes, hose.tables, fluid, h, V, x, work.rate, work.span, work.gradient, work.band)
     contact = loads.contact
     if contact.law[SELF_SCALE] > 0.0:
         add_self_contact(axes, contact, x, h, work)

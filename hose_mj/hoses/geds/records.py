@@ -11,6 +11,7 @@ import numpy as np
 
 from hose_mj.hoses.geds.basis import Tables
 from hose_mj.hoses.geds.contact_law import Contact
+from hose_mj.hoses.geds.morison import Morison
 from hose_mj.hoses.geds.span import Elasticity, Span, make_span
 from hose_mj.hoses.geds.twist import Twist
 from hose_mj.hoses.protocol import Array
@@ -97,7 +98,7 @@ class Constraints(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Dead loads and contact.
+    """Dead loads, contact and fluid.
 
     Attributes:
         force: generalised force on the control points, gravity included, flat (n d,).
@@ -105,6 +106,7 @@ class Loads(NamedTuple):
         moment_basis: N and dN/ds there, (k, 2, 4).
         moment: (k, 3) N m; a planar hose reads the first entry.
         contact: obstacles; see contact.py.
+        fluid: drag and added mass; see morison.py.
     """
 
     force: Array
@@ -112,6 +114,7 @@ class Loads(NamedTuple):
     moment_basis: Array
     moment: Array
     contact: Contact
+    fluid: Morison
 
 
 class Limits(NamedTuple):

@@ -405,7 +405,7 @@ def add_self_contact(axes, contact, x, step, work):
 
 @kernel
 def _set_sideways(row, slide, across):
-    """Writes the directions along the surface in which friction is stiff, without that of a slide."""
+    """Writes the directions along the surface in which friction is stiff: across a slide, or all."""
     n0, n1, n2 = row[_NORMAL], row[_NORMAL + 1], row[_NORMAL + 2]
     e0, e1, e2 = slide
     row[_STIFF + 1] = across

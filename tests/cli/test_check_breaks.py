@@ -95,6 +95,8 @@ def test_a_model_agrees_with_itself(capsys, models):
     assert (pair["same_kind"], pair["same_cell"], pair["disagreements"]) == (1.0, 1.0, [])
     assert [check["value"] for check in document["checks"]] == [1.0]
     assert document["kinds"]["geds"] == document["kinds"]["twin"]
+    assert set(document["health"]) == {"geds", "twin"}
+    assert document["health"]["twin"] == {"sequences": 0, "warnings": []}
 
 
 def test_a_model_that_differs_is_told_from_it(capsys, models):
@@ -117,11 +119,13 @@ def test_a_run_goes_on_from_what_is_kept(capsys, models, tmp_path):
     kept = json.loads((tmp_path / "geds.json").read_text())
     kept["endings"][0]["text"] = "kept"
     kept["endings"][0]["kind"] = "bounds"
+    kept["endings"][0]["warnings"] = ["a hold moves"]
     (tmp_path / "geds.json").write_text(json.dumps(kept))
     status, document = ask(capsys, *words, "--sequences", "2")
     assert status == 1
     (record,) = document["pairs"][0]["disagreements"]
     assert (record["number"], record["geds"]["text"]) == (0, "kept")
+    assert document["health"]["geds"] == {"sequences": 1, "warnings": ["a hold moves"]}
     assert len(json.loads((tmp_path / "twin.json").read_text())["endings"]) == 2
     assert cli.main(["check-breaks", *words, "--control-points", "17"]) == 2
     assert "geds.json" in capsys.readouterr().err

@@ -263,17 +263,15 @@ def _write_committed(page: Page, study: Study) -> None:
 
 
 def _write_trials(page: Page, study: Study, pictures: Pictures) -> None:
-    """A part for each trial: its words, pictures and checks."""
+    """A part for each trial: its words and pictures; its checks stand with all others."""
     if not study.findings:
         return
     section = write_text(page, "Hard cases")
     for trial in find_trials(tuple(study.findings)):
-        found = study.findings[trial.id]
         block = section.subsection(trial.title)
         block.paragraph(trial.about)
-        for name, plot in found.plots.items():
+        for name, plot in study.findings[trial.id].plots.items():
             block.figure(pictures[name], plot.title)
-        block.checks(found.checks)
 
 
 def _write_numerics(page: Page, pictures: Pictures) -> None:

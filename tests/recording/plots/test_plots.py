@@ -102,6 +102,7 @@ def test_values_that_a_log_axis_cannot_show_do_not_break_it():
     plot_convergence("t", "n", {"geds": ([8, 16], [0.0, 0.0]), "cable": ([8], [0.1])})
     plot_series("t", "y", {"geds": ([0.0, 1.0], [0.0, 0.0])})
     plot_series("t", "y", {"geds": ([0.0], [1.0])})
+    plot_series("t", "y", {"20 N": ([5], [0.02])}, {"bound": 0.2}, "radius (mm)", is_log=True)
 
 
 def test_snapshots_fade_and_carry_their_times():

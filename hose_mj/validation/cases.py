@@ -12,7 +12,7 @@ from importlib.metadata import EntryPoint
 
 from hose_mj.errors import InputError
 from hose_mj.plugins import find_plugins, load_plugin, load_plugins
-from hose_mj.validation import leaks, moorings, motions, ropes, statics
+from hose_mj.validation import knots, leaks, moorings, motions, ropes, statics
 from hose_mj.validation.case import Case
 from hose_mj.validation.reference import MOORINGS
 from hose_mj.validation.trial import Trial
@@ -48,6 +48,8 @@ TRIALS: tuple[Trial, ...] = (
     Trial("whirling-rope", ropes.measure_whirling_rope),
     Trial("post-pull", leaks.measure_post_pull),
     Trial("bar-drop", leaks.measure_bar_drop),
+    Trial("knot", knots.measure_knot),
+    Trial("plectoneme", knots.measure_plectoneme),
 )
 """What GEDS goes through alone."""
 

@@ -340,3 +340,36 @@ def stream_slope(weight: float, drag: float) -> float:
         drag: D, of a line across the current (N/m).
     """
     return (math.hypot(weight, 2.0 * drag) - weight) / (2.0 * drag)
+
+
+_KNOT = np.array(
+    [(150, 200, 300, 500, 700, 1000), (1.326, 1.262, 1.196, 1.139, 1.113, 1.0905)], dtype=float
+)
+
+
+def find_knot_pull(shortening: float) -> float:
+    """Pull T on an overhand knot without friction, as T e^2 / (2 pi^2 EI), for e in 150 to 1000.
+
+    Audoly, Clauvelin and Neukirch, PRL 99, 164301 (2007): elastica for loop and tails, joined by a
+    braid in contact.
+
+    Args:
+        shortening: e, how much nearer the ends are than the rope is long, in radii of the rope.
+    """
+    # Nearly linear in sqrt(radius / e), by which the limit 1 is approached.
+    return float(np.interp(-(shortening**-0.5), -(_KNOT[0] ** -0.5), _KNOT[1]))
+
+
+def find_plectoneme_moment(tension: float) -> float:
+    """Moment M h / EI of a long plectoneme without friction at a tension T h^2 / EI, h the radius.
+
+    Clauvelin, Audoly and Neukirch, Macromolecules 41, 4479 (2008): two strands in contact wound
+    at an angle a to their axis, T h^2 / EI = sin^4 a (1/2 + 1 / cos 2a) and M h / EI = 2 cos a
+    sin^3 a / cos 2a.
+    """
+
+    def pull(a: float) -> float:
+        return math.sin(a) ** 4 * (0.5 + 1.0 / math.cos(2.0 * a))
+
+    a = brentq(lambda a: pull(a) - tension, 0.0, 0.78)  # below pi / 4, where strands jam
+    return 2.0 * math.cos(a) * math.sin(a) ** 3 / math.cos(2.0 * a)

@@ -190,3 +190,15 @@ def test_the_whirling_rope_is_in_balance(k):
     # The axial force is the same all along; across, T r' falls by the centripetal force r.
     across = curve(s, 2)[:, 1] / slope[:, 0] - slope[:, 1] * curve(s, 2)[:, 0] / slope[:, 0] ** 2
     np.testing.assert_allclose(-unit * across, curve(s)[:, 1], rtol=2e-4)
+
+
+def test_the_plectoneme_meets_its_table():
+    # Angle .3 and .5: T h^2 / EI and M h / EI.
+    for tension, moment in ((0.01305, 0.05975), (0.12419, 0.35797)):
+        assert reference.find_plectoneme_moment(tension) == pytest.approx(moment, rel=1e-3)
+
+
+def test_the_knots_pull_tends_to_that_of_a_loop_of_line():
+    for size in (150.0, 400.0, 1000.0):
+        # 2 pi^2 EI (1 + 2.35 sqrt(h / e)) / e^2, to leading order.
+        assert reference.find_knot_pull(size) == pytest.approx(1 + 2.35 * size**-0.5, rel=0.12)

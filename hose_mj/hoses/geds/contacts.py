@@ -261,7 +261,7 @@ class ContactSet:
     @property
     def n_soft(self) -> int:
         """How many soft rows contact may add to the matrix."""
-        return min(3 * len(self._mates), _MOST_SOFT)
+        return min(6 * len(self._mates), _MOST_SOFT)
 
     @property
     def crossings(self) -> int:

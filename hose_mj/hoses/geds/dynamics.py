@@ -354,7 +354,7 @@ class Dynamics:
         add_contact(self.axes, loads.contact, x, motion, True, work.gradient, work.band)
         if self.loads.contacts.law.self_contact:
             work.start[:] = x
-            add_self_contact(self.axes, loads.contact, x, _ENDLESS, work)
+            add_self_contact(self.axes, loads.contact, x, _ENDLESS, True, work)
         return work
 
     def add_fluid(self, acceleration: Array, work: records.Work) -> None:

@@ -68,7 +68,7 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
 
     Returns DONE; DEPENDENT_CONSTRAINTS if the rows depend on each other; NOT_POSITIVE where K with
     D is not positive definite on the null space of the constraints, which is where that matrix has
-    not as many negative pivots as K, `n_negative`.
+    not as many negative pivots as K, `n_negative`, and D together.
     """
     width = 4 * len(axes)
     m = len(constraints.start) + len(constraints.twist.angle) + work.soft.used[0]
@@ -80,12 +80,13 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
         for k in range(size):
             z[m, k] *= work.signs[k]
     _make_schur(m, constraints, softness, n_negative, size, work)
+    wanted = n_negative + work.soft.used[1]
     if len(constraints.response.compliance) > 0:
         _add_compliance(m, compliance_factor, constraints.response.compliance, work.schur)
-        n_found = n_negative if _solve_general(m, work.schur, work.multipliers) else -1
+        n_found = wanted if _solve_general(m, work.schur, work.multipliers) else -1
     else:
         n_found = _solve_dense(m, work.schur, work.multipliers)
-    if n_found != n_negative:
+    if n_found != wanted:
         return DEPENDENT_CONSTRAINTS if n_found < 0 else NOT_POSITIVE
     for k in range(size):
         value = z[m, k]

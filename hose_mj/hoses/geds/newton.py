@@ -167,7 +167,7 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
         add_fluid(axes, hose.tables, fluid, h, V, x, work.rate, work.span, work.gradient, work.band)
     contact = loads.contact
     if contact.law[SELF_SCALE] > 0.0:
-        add_self_contact(axes, contact, x, h, work)
+        add_self_contact(axes, contact, x, h, exact, work)
     contact.found[TOUCHED] = 0.0
     if contact.geoms.shape[0] + contact.given.shape[0] > 0:
         motion = _make_motion(contact, progress, h, work)

@@ -142,12 +142,12 @@ class Limits(NamedTuple):
 
 
 class Soft(NamedTuple):
-    """Rows R that add R^T R / D to the matrix: what no band has room for.
+    """Rows R that add R^T R / D to the matrix: what no band has room for; D may be below zero.
 
     Attributes:
         rows: R, (P, n d + 4 d), written.
         compliance: D, (P,), m/N, written.
-        used: how many there are now, (1,), written.
+        used: how many there are now, and how many of these have D < 0, (2,), written.
     """
 
     rows: Array
@@ -211,5 +211,5 @@ def make_work(n_control_points: int, n_dof: int, n_rows: int, n_soft: int = 0) -
         np.zeros(size),
         np.zeros(size),
         np.zeros(size),
-        Soft(np.zeros((n_soft, padded)), np.zeros(n_soft), np.zeros(1, dtype=np.int64)),
+        Soft(np.zeros((n_soft, padded)), np.zeros(n_soft), np.zeros(2, dtype=np.int64)),
     )

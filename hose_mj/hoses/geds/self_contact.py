@@ -54,13 +54,16 @@ _MOVE = 0.5
 MATES = 2
 """Parts of the hose whose side and friction a contact point remembers at once: those on both sides
 in a coil."""
-MATE_ROW = 36
+MATE_ROW = 47
 """Columns of `Contact.mates`: point, its span, span and arc of the place, signed distance, normal
 (3), the five basis values of the place, tangent there (3), slot in memory, force per length (3), up
-to three directions (3, 3), their stiffness per length (3), normal force per length, and how far
-friction is drawn (3)."""
+to three directions (3, 3), their stiffness per length (3), normal force per length, how far
+friction is drawn (3), the direction across normal and tangent (3), by how much a turn of the normal
+softens there per length, derivatives of the basis values (5), |r'| there, and how fast d.r' falls
+along the place, |r'|^2 - d.r''."""
 _POINT, _SPAN, _OTHER, _ARC, _DISTANCE, _NORMAL, _BASIS, _TANGENT = 0, 1, 2, 3, 4, 5, 8, 13
 _SLOT, _FORCE, _WAYS, _STIFF, _PRESSED, _DRAWN = 16, 17, 20, 29, 32, 33
+_BINORMAL, _TURN, _CHANGES, _STRETCH, _FALL = 36, 39, 40, 45, 46
 STRAND_ROW = 8
 """Columns of `Contact.strands`: arc of the place (-1 for none), normal (3), signed distance, and
 how far friction is drawn (3)."""
@@ -230,7 +233,7 @@ def _note_pair(contact, names, t, n_pairs):
     q, j, e, f = names
     room = contact.room
     length = contact.arcs[j + 1] - contact.arcs[j]
-    value, slope, _ = _make_cubic(t, length)
+    value, slope, curve = _make_cubic(t, length)
     d0 = room[q, 0] - _mix(room, j, value, 0)
     d1 = room[q, 1] - _mix(room, j, value, 1)
     d2 = room[q, 2] - _mix(room, j, value, 2)
@@ -247,19 +250,24 @@ def _note_pair(contact, names, t, n_pairs):
     side = _find_side(contact, q, int(row[_SLOT]), (d0, d1, d2))
     row[_DISTANCE], scale = side * distance, side / distance
     row[_NORMAL], row[_NORMAL + 1], row[_NORMAL + 2] = scale * d0, scale * d1, scale * d2
-    stretch = 0.0
+    stretch, bend = 0.0, 0.0
     for c in range(3):
-        row[_TANGENT + c] = _mix(room, j, slope, c)
+        row[_TANGENT + c] = _mix(room, j, slope, c) / length
         stretch += row[_TANGENT + c] ** 2
-    for c in range(3):
-        row[_TANGENT + c] /= np.sqrt(max(stretch, 1e-300))
-    for c in range(5):
-        row[_BASIS + c] = 0.0
+        bend += row[_NORMAL + c] * _mix(room, j, curve, c) / (length * length)
+    row[_STRETCH], row[_FALL] = np.sqrt(max(stretch, 1e-300)), stretch - row[_DISTANCE] * bend
     later = 1 if j + 1 >= contact.first[f + 1] else 0
+    for c in range(5):
+        row[_BASIS + c] = row[_CHANGES + c] = 0.0
+    for c in range(3):
+        row[_TANGENT + c] /= row[_STRETCH]
     for c in range(4):
-        row[_BASIS + c] += value[0] * contact.points[j, c] + value[1] * contact.changes[j, c]
-        row[_BASIS + later + c] += value[2] * contact.points[j + 1, c]
-        row[_BASIS + later + c] += value[3] * contact.changes[j + 1, c]
+        here, there = contact.points[j, c], contact.points[j + 1, c]
+        turn, next_turn = contact.changes[j, c], contact.changes[j + 1, c]
+        row[_BASIS + c] += value[0] * here + value[1] * turn
+        row[_BASIS + later + c] += value[2] * there + value[3] * next_turn
+        row[_CHANGES + c] += (slope[0] * here + slope[1] * turn) / length
+        row[_CHANGES + later + c] += (slope[2] * there + slope[3] * next_turn) / length
     return n_pairs + 1
 
 
@@ -367,7 +375,7 @@ def _evaluate_pair(axes, contact, k, rate, x, start, step):
 
 
 @apart
-def add_self_contact(axes, contact, x, step, work):
+def add_self_contact(axes, contact, x, step, exact, work):
     """Adds the forces of a hose on itself to work.gradient and their derivative to work.soft.
 
     Args:
@@ -375,10 +383,11 @@ def add_self_contact(axes, contact, x, step, work):
         contact: its law and contact points; `mates` is written.
         x: control points, flat; their velocity is in work.rate.
         step: length of the stage (s).
+        exact: whether what softens enters the matrix.
         work: work arrays.
     """
     soft = work.soft
-    soft.used[0] = 0
+    soft.used[0] = soft.used[1] = 0
     n_pairs = _find_pairs(axes, contact, x)
     for k in range(n_pairs):
         row = contact.mates[k]
@@ -387,7 +396,7 @@ def add_self_contact(axes, contact, x, step, work):
         for c in range(3):
             row[_STIFF + c], row[_FORCE + c], row[_DRAWN + c] = 0.0, force[c], left[c]
             row[_WAYS + c] = row[_NORMAL + c]
-        row[_PRESSED] = N
+        row[_PRESSED], row[_TURN] = N, 0.0
         if N == 0.0:
             continue
         row[_STIFF] = slope * (1.0 + contact.law[DAMPING] / step)
@@ -398,6 +407,8 @@ def add_self_contact(axes, contact, x, step, work):
         for way in range(3):
             if row[_STIFF + way] > 0.0:
                 _add_row(axes, contact, row, way, share, work)
+        if exact and soft.used[0] + 3 <= soft.rows.shape[0]:
+            _add_turn(axes, contact, row, share, work)
     if step == np.inf:
         # No steps tell where strands come from: each iteration goes on from the one before.
         _remember_all(contact, n_pairs)
@@ -405,7 +416,7 @@ def add_self_contact(axes, contact, x, step, work):
 
 @kernel
 def _set_sideways(row, slide, across):
-    """Writes the directions along the surface in which friction is stiff: across a slide, or all."""
+    """Writes the directions in which friction is stiff: along the surface, but for a slide's."""
     n0, n1, n2 = row[_NORMAL], row[_NORMAL + 1], row[_NORMAL + 2]
     e0, e1, e2 = slide
     row[_STIFF + 1] = across
@@ -450,10 +461,7 @@ def _add_row(axes, contact, row, way, share, work):
     direction = (row[at], row[at + 1], row[at + 2])
     stiffness = share * row[_STIFF + way]
     if k < soft.rows.shape[0]:
-        soft.rows[k, :] = 0.0
-        _scatter(axes, contact, row, 1.0, direction, soft.rows[k])
-        soft.compliance[k] = 1.0 / stiffness
-        soft.used[0] = k + 1
+        _add_soft(axes, contact, row, direction, stiffness, work)
         return
     points, q = contact.points, int(row[_POINT])
     for i in range(5):
@@ -464,6 +472,48 @@ def _add_row(axes, contact, row, way, share, work):
             other = 2.0 * stiffness * row[_BASIS + i] * row[_BASIS + j]
             if i - j < 4 and other != 0.0:
                 _add_block(axes, work.band, int(row[_OTHER]), (i, j), direction, other)
+
+
+@kernel
+def _add_turn(axes, contact, row, share, work):
+    """Adds what comes of the turn of a push with its normal: -N times the distance's Hessian.
+
+    With d from place to point, D = |d|, t the place's tangent, b = n x t and u the difference of
+    the displacements of point and place, that Hessian is [(b.u)^2 + (t.u)^2] / D - [n.r' + |r'| t.u
+    / D]^2 D / (|r'|^2 - d.r''): the nearest place goes along.
+    """
+    n = (row[_NORMAL], row[_NORMAL + 1], row[_NORMAL + 2])
+    t = (row[_TANGENT], row[_TANGENT + 1], row[_TANGENT + 2])
+    b = (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
+    row[_BINORMAL], row[_BINORMAL + 1], row[_BINORMAL + 2] = b
+    # Near the middle of the other strand the normal turns by any angle.
+    distance = max(row[_DISTANCE], contact.law[RADIUS])
+    row[_TURN] = -row[_PRESSED] / distance
+    _add_soft(axes, contact, row, b, share * row[_TURN], work)
+    _add_soft(axes, contact, row, t, share * row[_TURN], work)
+    part = row[_STRETCH] / distance
+    fall = max(row[_FALL], 0.1 * row[_STRETCH] ** 2)  # below, the strand bends round the point
+    stiffness = share * row[_PRESSED] * distance / fall
+    way = (part * t[0], part * t[1], part * t[2])
+    soft, d = work.soft, len(axes)
+    k = soft.used[0]
+    _add_soft(axes, contact, row, way, stiffness, work)
+    for i in range(5):
+        for c in range(len(axes[:3])):
+            if row[_CHANGES + i] != 0.0:
+                soft.rows[k, (int(row[_OTHER]) + i) * d + c] -= row[_CHANGES + i] * n[c]
+
+
+@kernel
+def _add_soft(axes, contact, row, direction, stiffness, work):
+    """Adds a soft row: what a pair's point moves more than its place along a direction."""
+    soft, k = work.soft, work.soft.used[0]
+    soft.rows[k, :] = 0.0
+    _scatter(axes, contact, row, 1.0, direction, soft.rows[k])
+    soft.compliance[k] = 1.0 / stiffness
+    soft.used[0] += 1
+    if stiffness < 0.0:
+        soft.used[1] += 1
 
 
 @kernel
@@ -525,6 +575,10 @@ def measure_self_left(axes, contact, x, step, work):
             if k_way > 0.0:
                 f = k_way * (row[at] * d0 + row[at + 1] * d1 + row[at + 2] * d2)
                 r = (r[0] + f * row[at], r[1] + f * row[at + 1], r[2] + f * row[at + 2])
+        if row[_TURN] < 0.0:
+            at = _BINORMAL
+            f = row[_TURN] * (row[at] * d0 + row[at + 1] * d1 + row[at + 2] * d2)
+            r = (r[0] + f * row[at], r[1] + f * row[at + 1], r[2] + f * row[at + 2])
         share = contact.points[int(row[_POINT]), 4]
         left += share * np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
     return left

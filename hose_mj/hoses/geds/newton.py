@@ -22,7 +22,12 @@ from hose_mj.hoses.geds.kkt import add_constraint_weight, multiply_row, solve_wi
 from hose_mj.hoses.geds.morison import add_fluid
 from hose_mj.hoses.geds.packing import unpack
 from hose_mj.hoses.geds.records import DONE, NOT_CONVERGED, NOT_FINITE, NOT_POSITIVE
-from hose_mj.hoses.geds.self_contact import add_self_contact, limit_move, measure_self_left
+from hose_mj.hoses.geds.self_contact import (
+    add_self_contact,
+    drop_softening,
+    limit_move,
+    measure_self_left,
+)
 from hose_mj.hoses.geds.span import LEAST_A
 from hose_mj.hoses.geds.twist import predict_twist
 from hose_mj.jit import apart, choose_by_unknowns, compiled, inlined, merged
@@ -357,9 +362,14 @@ def _solve(axes, constraints, fraction, softness, exact, limits, size, work):
     for k in range(size):
         work.residual[k] = work.gradient[k]
     compliance_factor = fraction * constraints.response.share[0]
-    return solve_with_constraints(
-        axes, constraints, compliance_factor, softness, n_negative, size, work
-    )
+    while True:
+        verdict = solve_with_constraints(
+            axes, constraints, compliance_factor, softness, n_negative, size, work
+        )
+        if verdict != NOT_POSITIVE or work.soft.used[1] == 0:
+            return verdict
+        # Along what nothing holds, as a knot without friction, contact softens too much.
+        drop_softening(work.soft)
 
 
 @inlined

@@ -51,6 +51,8 @@ _LOOKS = 8
 """Newton steps, kept within their bracket, to the nearest place of a cubic: three are the rule."""
 _MOVE = 0.5
 """Newton's steps change what is near by so many radii at most: beyond, its sides are not known."""
+_NO_EFFECT = 1e200
+"""Compliance of a row without effect (m/N)."""
 MATES = 2
 """Parts of the hose whose side and friction a contact point remembers at once: those on both sides
 in a coil."""
@@ -407,7 +409,9 @@ def add_self_contact(axes, contact, x, step, exact, work):
         for way in range(3):
             if row[_STIFF + way] > 0.0:
                 _add_row(axes, contact, row, way, share, work)
-        if exact and soft.used[0] + 3 <= soft.rows.shape[0]:
+        # Statics go on without: a knot without friction slides along its rope, and nothing but the
+        # lattice decides where it stops.
+        if exact and step < np.inf and soft.used[0] + 3 <= soft.rows.shape[0]:
             _add_turn(axes, contact, row, share, work)
     if step == np.inf:
         # No steps tell where strands come from: each iteration goes on from the one before.
@@ -502,6 +506,15 @@ def _add_turn(axes, contact, row, share, work):
         for c in range(len(axes[:3])):
             if row[_CHANGES + i] != 0.0:
                 soft.rows[k, (int(row[_OTHER]) + i) * d + c] -= row[_CHANGES + i] * n[c]
+
+
+@kernel
+def drop_softening(soft):
+    """Leaves rows with D < 0 out of the matrix."""
+    for k in range(soft.used[0]):
+        if soft.compliance[k] < 0.0:
+            soft.compliance[k] = _NO_EFFECT
+    soft.used[1] = 0
 
 
 @kernel

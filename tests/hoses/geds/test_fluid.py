@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hose_mj import Fluid, HoseSpec, InputError, StepError, make_hose
+from hose_mj import Fluid, HoseSpec, InputError, Obstacle, StepError, make_hose
 from hose_mj.hoses.geds.fluid_load import FluidLoad
 from hose_mj.hoses.geds.morison import add_fluid
 from hose_mj.hoses.geds.records import make_work
@@ -116,6 +116,28 @@ def test_a_current_along_a_field_is_an_equilibrium_of_the_motion():
     assert np.ptp(shape[:, 1]) > 0.02
     hose.step(100)
     assert hose.control_points == pytest.approx(shape, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "floor", "current"),
+    [(0.0, None, (2.0, 0.0, 0.3)), (1e-5, -0.38, (0.5, 0.3, 0.0)), (1e-5, -0.38, (-0.5, 0.0, 0.0))],
+)
+def test_a_slack_line_stays_where_statics_put_it(stiffness, floor, current):
+    bed = [] if floor is None else [Obstacle(kind="plane", position=(0, 0, floor), friction=0.0)]
+    spec = replace(SPEC, bending_stiffness=stiffness)
+    hose = make(replace(WATER, velocity=current), spec, control_points=20, obstacles=bed)
+    turn = np.linspace(-0.8, 0.8, 401)  # an arc of a circle
+    hose.reset(1.25 * np.stack([np.sin(turn), 0 * turn, np.cos(0.8) - np.cos(turn)], axis=1))
+    holds = [hose.attach(0.0), hose.attach(LENGTH)]
+    hose.solve_static()
+    shape = hose.control_points
+    hose.step(50)
+    assert hose.control_points == pytest.approx(shape, abs=1e-7)
+    load = sum(hose.reaction(hold).force for hold in holds) + hose.contacts.compute_forces().sum(
+        axis=0
+    )
+    drag = hose._loads.fluid.compute_drag(hose._state.x)[0].reshape(-1, 3).sum(axis=0)
+    assert load + drag == pytest.approx([0, 0, LENGTH * WEIGHT], abs=1e-6)
 
 
 def test_buoyancy_takes_weight_off_the_holds():

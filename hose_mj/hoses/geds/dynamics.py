@@ -351,10 +351,8 @@ class Dynamics:
         fluid, (x, v) = self.loads.fluid, self.state[:2]
         if len(fluid.morison.current) > 0:
             fluid.update(x)
-            add_fluid(
-                *(self.axes, self.hose.tables, fluid.morison, 1.0, v - acceleration, x, v),
-                *(work.span, work.gradient, work.band),
-            )
+            still = v - acceleration
+            add_fluid(self.axes, fluid.morison, 1.0, still, x, v, work.gradient, work.band)
 
     def linearize(self, step: float = _ENDLESS) -> Linearization:
         """Returns dense mass, stiffness (of `build_tangent`, with the twist) and constraints."""

@@ -183,14 +183,13 @@ def test_inverse_dynamics_knows_the_fluid(plane):
 def test_the_matrix_is_the_derivative_by_the_velocity(plane):
     hose = make(plane=plane)
     lay_bent(hose, across=0.0 if plane else 1.0)
-    axes, tables = hose._axes, hose._hose.tables
-    x, v = hose._state.x, hose._state.v
+    axes, x, v = hose._axes, hose._state.x, hose._state.v
     h, size, width = 0.01, len(x), 4 * len(axes)
 
     def evaluate(rate):
         work = make_work(12, len(axes), 0)
         fluid = hose._loads.fluid.morison
-        add_fluid(axes, tables, fluid, h, 0.5 * v, x, rate, work.span, work.gradient, work.band)
+        add_fluid(axes, fluid, h, 0.5 * v, x, rate, work.gradient, work.band)
         return work.gradient[:size].copy(), work.band
 
     band = evaluate(v)[1]
@@ -213,10 +212,7 @@ def test_the_drag_of_statics_is_that_of_the_motion_and_has_its_derivative(plane)
     drag, slope = load.compute_drag(x)
     work = make_work(12, len(hose._axes), 0)
     still = np.zeros_like(x)
-    add_fluid(
-        *(hose._axes, hose._hose.tables, load.morison, 1.0, still, x, still),
-        *(work.span, work.gradient, work.band),
-    )
+    add_fluid(hose._axes, load.morison, 1.0, still, x, still, work.gradient, work.band)
     assert drag == pytest.approx(-work.gradient[: len(x)], rel=1e-12, abs=1e-14)
     unit = 1e-6 * np.eye(len(x))
     wanted = [(load.compute_drag(x + e)[0] - load.compute_drag(x - e)[0]) / 2e-6 for e in unit]

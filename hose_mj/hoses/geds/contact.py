@@ -165,9 +165,9 @@ def add_contact(axes, contact, x, motion, exact, gradient, band):
                 if n_contacts == n_before:
                     contact.block[:, :] = 0.0
                 n_contacts += 1
-                _gather(axes, contact, at, start, force, matrix, gradient)
+                gather(axes, contact.points, contact.block, at, start, force, matrix, gradient)
         if n_contacts > n_before:
-            _scatter_block(axes, contact.block, start, band)
+            scatter_block(axes, contact.block, start, band)
     contact.found[TOUCHED] = n_pairs
     return n_contacts
 
@@ -213,10 +213,9 @@ def _make_matrix(contact, touch, answer, step, exact):
 
 
 @kernel
-def _gather(axes, contact, q, start, force, matrix, gradient):
+def gather(axes, points, block, q, start, force, matrix, gradient):
     """Adds a point's force to the residual and its matrix to the span's block."""
-    d = len(axes)
-    points, share = contact.points, contact.points[q, 4]
+    d, share = len(axes), points[q, 4]
     row = 0
     for i in range(4):
         weight = share * points[q, i]
@@ -225,12 +224,12 @@ def _gather(axes, contact, q, start, force, matrix, gradient):
         for j in range(i + 1):
             product = weight * points[q, j]
             for c in range(6):
-                contact.block[row, c] += product * matrix[c]
+                block[row, c] += product * matrix[c]
             row += 1
 
 
 @kernel
-def _scatter_block(axes, block, start, band):
+def scatter_block(axes, block, start, band):
     """Adds the block of a span to the band."""
     d = len(axes)
     n_coordinates = len(axes[:3])

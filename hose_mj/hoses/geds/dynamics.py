@@ -54,7 +54,7 @@ _ROUNDING = 1e-12
 _SLOW = 1e-2
 """Of EI / (rho L^4): the square of a rate below which growth counts as none (1/s^2); the slowest
 bending motion of a clamped hose is 35 times as fast."""
-_MOST_BALANCES = 100
+_MOST_BALANCES = 30
 """Of a current's drag with the hose's shape, at half a radian a span each."""
 _BALANCED = 1e-9
 """Of the move of a control point, in lengths, that drag and shape still ask of each other: dead
@@ -168,24 +168,25 @@ class Dynamics:
         Raises:
             StepError: no equilibrium was found; the state before is kept.
         """
-        if not self.loads.fluid.moves:
-            self._settle(load_steps)
-            return
         rows = self.constraints.rows
         twist = rows.twist.accepted, rows.twist.spin
         changing = (*twist, rows.before, rows.after, rows.multipliers, *self.state)
         before = [part.copy() for part in changing]
-        while True:
+        self._settle(load_steps)
+        if not self.loads.fluid.moves:
+            return
+        still = [part.copy() for part in changing]
+        while load_steps <= MOST_LOAD_STEPS:
             try:
                 self._meet_current(load_steps)
                 return
-            except StepError:
-                _copy(before, changing)
+            except (StepError, np.linalg.LinAlgError):
+                _copy(still, changing)
                 load_steps *= 2
-                if load_steps > MOST_LOAD_STEPS:
-                    raise
             finally:
                 self.loads.hold_drag(np.zeros_like(self.state.x))
+        _copy(before, changing)
+        raise StepError("no static equilibrium in the current was found")
 
     def _meet_current(self, load_steps: int) -> None:
         """Settles under loads and drag; raises `StepError` where the shape does not come to rest.
@@ -199,7 +200,7 @@ class Dynamics:
         for share in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
             for _ in range(_MOST_BALANCES):
                 self.loads.hold_drag(held)
-                self._settle(load_steps)
+                self._settle(1)
                 drag, slope = fluid.compute_drag(self.state.x)
                 small = self.linearize(np.inf)
                 rows, none = small.constraints, np.zeros((len(small.constraints),) * 2)
@@ -211,10 +212,10 @@ class Dynamics:
                 if np.abs(move).max() <= _BALANCED * length:
                     break
                 turn = np.abs(slopes * np.diff(move.reshape(-1, len(self.axes))[:, :3], axis=0))
-                part = min(1.0, _STATIC_TURN / turn.max())
+                part = 1.0 / max(1.0, turn.max() / _STATIC_TURN)
                 held = held + part * (share * (drag + slope @ move) - held)
             else:
-                raise StepError("no static equilibrium in the current was found")
+                raise StepError("drag and shape do not come to rest")
 
     def _settle(self, load_steps: int) -> None:
         """`solve_static` for dead loads."""
@@ -362,10 +363,8 @@ class Dynamics:
         fluid, (x, v) = self.loads.fluid, self.state[:2]
         if len(fluid.morison.current) > 0:
             fluid.update(x)
-            add_fluid(
-                *(self.axes, self.hose.tables, fluid.morison, 1.0, v - acceleration, x, v),
-                *(work.span, work.gradient, work.band),
-            )
+            still = v - acceleration
+            add_fluid(self.axes, fluid.morison, 1.0, still, x, v, work.gradient, work.band)
 
     def linearize(self, step: float = _ENDLESS) -> Linearization:
         """Returns dense mass, stiffness (of `build_tangent`, with the twist) and constraints."""

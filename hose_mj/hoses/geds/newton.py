@@ -167,9 +167,8 @@ def build(axes, hose, stage, twist, progress, loads, scale, exact, x, work):
     )
     if len(loads.moment_start) > 0:
         add_moments(axes, loads, exact, x, work)
-    fluid = loads.fluid
-    if len(fluid.current) > 0 and h < np.inf:
-        add_fluid(axes, hose.tables, fluid, h, V, x, work.rate, work.span, work.gradient, work.band)
+    if len(loads.fluid.current) > 0 and h < np.inf:
+        add_fluid(axes, loads.fluid, h, V, x, work.rate, work.gradient, work.band)
     contact = loads.contact
     if contact.law[SELF_SCALE] > 0.0:
         add_self_contact(axes, contact, x, h, exact, work)

@@ -55,13 +55,25 @@ def unpack(typing: Any, address: Any) -> Any:
 def _list_words(value: Any) -> list[int]:
     """A value as words of eight bytes: all that records hold takes whole ones."""
     if isinstance(value, np.ndarray):
-        data = value.ctypes.data
+        data = value.__array_interface__["data"][0]
         return [0, 0, value.size, value.itemsize, data, *value.shape, *value.strides]
     if isinstance(value, tuple):
         return [word for part in value for word in _list_words(part)]
     if isinstance(value, float):
         return [int(np.float64(value).view(np.int64))]
     return [int(value)]
+
+
+def _describe(value: Any) -> Any:
+    """What numba's type of a record depends on."""
+    if isinstance(value, np.ndarray):
+        flags = value.flags
+        return value.dtype.char, value.ndim, flags.c_contiguous, flags.aligned, flags.writeable
+    return (type(value), *map(_describe, value)) if isinstance(value, tuple) else type(value)
+
+
+_KINDS: dict[Any, Address] = {}
+"""By what `_describe` says: to ask numba takes as long as some hundred steps."""
 
 
 class Packed:
@@ -79,7 +91,10 @@ class Packed:
     def __init__(self, record: Any) -> None:
         self._record = record  # keeps its arrays alive
         self._words = np.array(_list_words(record), dtype=np.int64)
-        self.kind, self.address = Address(typeof(record)), self._words.ctypes.data
+        description = _describe(record)
+        if description not in _KINDS:
+            _KINDS[description] = Address(typeof(record))
+        self.kind, self.address = _KINDS[description], self._words.ctypes.data
 
 
 def _check_layout() -> None:

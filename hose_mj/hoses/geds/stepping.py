@@ -21,10 +21,29 @@ from hose_mj.hoses.geds.packing import unpack
 from hose_mj.hoses.geds.point_masses import NEAR, PointMasses, aim, is_clear, move, move_shapes
 from hose_mj.hoses.geds.records import DONE, Constraints, Hose, Limits, Loads, Work
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import kernel
+from hose_mj.jit import bitwise, kernel
 
-ADVANCE, TRY, ACCEPT = range(3)
-"""What `advance` is to do: steps, one step into `trial`, or to make that one count."""
+ADVANCE, TRY, ACCEPT, FOLLOW = range(4)
+"""What `advance` is to do: steps, one step into `trial`, to make that one count, or steps along a
+path."""
+
+
+class Path(NamedTuple):
+    """Where holds are to be at the end of each of n steps.
+
+    Attributes:
+        rows: of the constraints whose g changes, (k,).
+        places: their g, (n, k).
+        slopes: rows of the constraints that turn, (l,).
+        coefficients: of these, (n, l, 4 d).
+        yields: 1.0 for those with a spring, whose g is always 0, (l,).
+    """
+
+    rows: np.ndarray
+    places: Array
+    slopes: np.ndarray
+    coefficients: Array
+    yields: Array
 
 
 class Session(NamedTuple):
@@ -40,6 +59,7 @@ class Session(NamedTuple):
         counts: see `integrators.STEPS`, (4,).
         masses: at its attachments; none but where bodies are stepped with it.
         first: first rows of the masses' constraints, (k,).
+        path: that `FOLLOW` goes.
         work: work arrays.
     """
 
@@ -54,7 +74,30 @@ class Session(NamedTuple):
     counts: Array
     masses: PointMasses
     first: np.ndarray
+    path: Path
     work: Work
+
+
+@bitwise
+def _measure_slope(constraints, row, width, x):
+    """What a row makes of x, added up in order: `ConstraintSet.move` does the same."""
+    value = 0.0
+    for k in range(width):
+        value += constraints.rows[row, k] * x[constraints.start[row] + k]
+    return value
+
+
+@kernel
+def _aim_holds(axes, constraints, path, k, x):
+    """Sets where holds are to be at the end of step k of a path."""
+    for j in range(len(path.rows)):
+        constraints.after[path.rows[j]] = path.places[k, j]
+    for j in range(len(path.slopes)):
+        row, width = path.slopes[j], path.coefficients.shape[2]
+        for i in range(width):
+            constraints.rows[row, i] = path.coefficients[k, j, i]
+        turned = 0.0 if path.yields[j] > 0.0 else _measure_slope(constraints, row, width, x)
+        constraints.before[row] = turned
 
 
 @kernel
@@ -64,13 +107,15 @@ def advance(address, what, scheme, n_steps):
     That of the last step tried: a step that fails leaves the state at the step before it. `NEAR`
     where a mass may meet something in the next step. See `ADVANCE` for what it is to do.
     """
-    axes, hose, constraints, loads, limits, dt, own, trial, counts, masses, first, work = unpack(
-        address
+    axes, hose, constraints, loads, limits, dt, own, trial, counts, masses, first, path, work = (
+        unpack(address)
     )
     if what == TRY:
         copy_state(own, trial)
     state = trial if what == TRY else own
-    for _ in range(n_steps):
+    for k in range(n_steps):
+        if what == FOLLOW:
+            _aim_holds(axes, constraints, path, k, state.x)
         if what == ACCEPT:
             copy_state(trial, state)
         else:
@@ -111,7 +156,9 @@ def advance_verlet(address, what, scheme, n_steps):
     session = unpack(address)
     axes, hose, constraints, loads = session[:4]
     dt, state, counts, work = session.timestep, session.state, session.counts, session.work
-    for _ in range(n_steps):
+    for k in range(n_steps):
+        if what == FOLLOW:
+            _aim_holds(axes, constraints, session.path, k, state.x)
         verdict = take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts)
         if verdict != DONE:
             return verdict

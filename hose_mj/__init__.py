@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hose_mj.hoses.protocol import Hold, HoseModel
     from hose_mj.hoses.registry import make_hose
     from hose_mj.hoses.spec import Fitting, HoseSpec
+    from hose_mj.hoses.springs import Spring
     from hose_mj.scenes.mjcf.catalogue import find_scene
     from hose_mj.scenes.mjcf.scene import read_scene
     from hose_mj.tasks.registry import make_task
@@ -46,6 +47,7 @@ __all__ = [
     "Limits",
     "Monitor",
     "Obstacle",
+    "Spring",
     "StepError",
     "__version__",
     "find_scene",
@@ -69,6 +71,7 @@ _HOMES = {
     "Limits": "hose_mj.constraints.limits",
     "Monitor": "hose_mj.constraints.monitor",
     "Obstacle": "hose_mj.hoses.obstacles",
+    "Spring": "hose_mj.hoses.springs",
     "StepError": "hose_mj.errors",
     "find_scene": "hose_mj.scenes.mjcf.catalogue",
     "make_hose": "hose_mj.hoses.registry",

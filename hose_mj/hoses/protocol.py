@@ -8,7 +8,7 @@ answers with a leading axis k.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -215,6 +215,23 @@ class HoseModel(Protocol):
 
         Raises:
             StepError: a step that cannot be finished; the state before it is kept.
+        """
+        ...
+
+    def follow(
+        self,
+        positions: Mapping[Hold, ArrayLike],
+        tangents: Mapping[Hold, ArrayLike] | None = None,
+    ) -> None:
+        """Takes as many steps as paths have rows: `move` to row k and `step`, for each k.
+
+        Args:
+            positions: of holds at the end of each of n steps, (n, 3), m, world frame.
+            tangents: of clamps, likewise.
+
+        Raises:
+            InputError: paths of unequal lengths, what is not finite, or what `move` refuses.
+            StepError: as `step`; the steps before count.
         """
         ...
 

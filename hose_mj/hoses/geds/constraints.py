@@ -10,8 +10,8 @@ all of them (loops.py).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
 from functools import partial
 from typing import Any
 
@@ -19,19 +19,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
-from hose_mj.hoses.geds import loops, records, twist_loads, twist_segments
+from hose_mj.hoses.geds import loops, records, stepping, twist_loads, twist_segments
 from hose_mj.hoses.geds.frames import transport_frames
 from hose_mj.hoses.geds.span import make_span
 from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.geds.twist import Twist, find_owners
 from hose_mj.hoses.geds.twist_loads import AppliedTorque, Stretch
 from hose_mj.hoses.inputs import check_records, check_vector, read_numbers
+from hose_mj.hoses.paths import HoldPath
 from hose_mj.hoses.protocol import Array, Hold, Reaction
 from hose_mj.hoses.snapshots import take, take_array, take_count, take_flag, take_list
 from hose_mj.hoses.spec import check_number
+from hose_mj.hoses.springs import Spring
 
 _REMEMBERED = ("directors", "spin", "angle", "trial", "torque", "accepted")
 """What of the twist goes into a snapshot."""
+_RIGID = Spring()
 _FIRST_END, _LAST_END = -1, -2
 """Numbers of the clamps at s = 0 and s = L of a closed loop, which hold nothing (twist.py)."""
 
@@ -45,6 +48,8 @@ class _Held:
     tangent: Array | None  # (3,), unit
     multipliers: Array  # (d,) or (2 d - 1,), one more with theta
     basis: Array  # N and two derivatives at its place, (3, 4)
+    spring: Spring = _RIGID  # what it gives way by
+    before: Array | None = None  # (d,), its target at the beginning of the next step
     first: int = 0  # its first row of G x = g
 
 
@@ -107,20 +112,29 @@ class ConstraintSet:
             twist.accepted[:] = twist.frames
         self.rows = self._make_rows(twist)
 
-    def add(self, arc_length: float, position: ArrayLike | None, tangent: Array | None) -> Hold:
+    def add(
+        self,
+        arc_length: float,
+        position: ArrayLike | None,
+        tangent: Array | None,
+        spring: Spring | None = None,
+    ) -> Hold:
         """Adds a hold.
 
         Args:
             arc_length: where on the hose (m).
             position: wanted place (3,) m; None for where the hose is now.
             tangent: wanted unit tangent (3,) of a clamp; None for an attachment.
+            spring: what it gives way by; None for a rigid hold.
 
         Raises:
             InputError: a place off the hose or that another hold is at, a position off its plane, a
-                tangent more than 90 degrees from where the hose points, more holds than the spline
-                has unknowns for.
+                tangent more than 90 degrees from where the hose points, what is no spring, more
+                holds than the spline has unknowns for.
         """
         spline = self._spline
+        if not isinstance(spring, Spring | None):
+            raise InputError("spring", spring, "a Spring, or None for a rigid hold")
         s = spline.check_place(arc_length)
         for held in self._held:
             apart = abs(held.hold.arc_length - s)
@@ -146,15 +160,20 @@ class ConstraintSet:
             raise InputError("number of rows of all holds", in_all, valid)
         self._n_made += 1
         self.is_moved = True
-        self._held.append(self._make_held(hold, point, tangent, np.zeros(n_rows)))
+        self._held.append(self._make_held(hold, point, tangent, np.zeros(n_rows), spring))
         self._rebuild()
         return hold
 
     def _make_held(
-        self, hold: Hold, position: Array, tangent: Array | None, multipliers: Array
+        self,
+        hold: Hold,
+        position: Array,
+        tangent: Array | None,
+        multipliers: Array,
+        spring: Spring | None,
     ) -> _Held:
         values = self._spline.compute_basis(np.array([hold.arc_length]))[1][0]
-        return _Held(hold, position, tangent, multipliers, values)
+        return _Held(hold, position, tangent, multipliers, values, spring or _RIGID)
 
     def move(
         self,
@@ -194,6 +213,44 @@ class ConstraintSet:
             for h in self._held
         ]
         return max((float(np.linalg.norm(way)) for way in ways), default=0.0)
+
+    def make_path(self, paths: Mapping[Hold, HoldPath], n_steps: int) -> stepping.Path:
+        """Returns paths of n steps as the kernels read them.
+
+        Raises:
+            InputError: as `move` for any of their rows.
+        """
+        d, width = self._spline.dimension, 4 * self._spline.n_dof
+        rows, slopes, yields = list[int](), list[int](), list[float]()
+        places, coefficients = [np.zeros((n_steps, 0))], [np.zeros((n_steps, 0, width))]
+        for hold, path in paths.items():
+            held = self._find(hold)
+            if path.positions is not None:
+                off = path.positions - self._spline.offset
+                for way in off if d == 2 else ():
+                    self._spline.check_in_plane("position", way, 1e-9 * self._spline.length)
+                places.append(off[:, self._spline.dims])
+                rows += range(held.first, held.first + d)
+            if path.tangents is not None and held.tangent is not None:
+                aims = [held.tangent, *map(self._spline.check_direction, path.tangents)]
+                for aim, now in zip(aims[1:], aims, strict=False):
+                    _check_ahead(aim, now)
+                turned = [self._make_slope_rows(held, aim).reshape(-1, width) for aim in aims[1:]]
+                coefficients.append(np.array(turned))
+                slopes += range(held.first + d, held.first + 2 * d - 1)
+                yields += [float(held.spring.turn_stiffness < np.inf)] * (d - 1)
+        whole = np.array(rows, dtype=np.int64), np.concatenate(places, axis=1)
+        turns = np.array(slopes, dtype=np.int64), np.concatenate(coefficients, axis=1)
+        return stepping.Path(*whole, *turns, np.array(yields, dtype=np.float64))
+
+    def follow(self, paths: Mapping[Hold, HoldPath], k: int) -> None:
+        """Remembers that holds are where step k of their paths ends; the rows know."""
+        for hold, path in paths.items():
+            held = self._find(hold)
+            if path.positions is not None:
+                held.position = path.positions[k].copy()
+            if path.tangents is not None:
+                held.tangent = self._spline.check_direction(path.tangents[k])
 
     def check_director(self, director: ArrayLike, tangent: Array) -> Array:
         """Returns the part of a director (3,) across a unit tangent, as a unit vector.
@@ -250,8 +307,10 @@ class ConstraintSet:
         given = list(check_records("holds", holds, Hold))
         if given != self._compliant:
             for hold in given:
-                if self._find(hold).tangent is not None:
-                    raise InputError("hold", hold, "an attachment: a clamp on a body gives no way")
+                held = self._find(hold)
+                if held.tangent is not None or held.spring != _RIGID:
+                    valid = "an attachment without a spring: what holds it gives way"
+                    raise InputError("hold", hold, valid)
             self._compliant = given
             self._compliant_first = np.array([self._find(h).first for h in given], dtype=np.int64)
             d = self._spline.dimension
@@ -436,7 +495,7 @@ class ConstraintSet:
                 "arc_length": one.hold.arc_length,
                 "position": one.position.copy(),
                 "tangent": None if one.tangent is None else one.tangent.copy(),
-                "multipliers": one.multipliers.copy(),
+                "spring": list(astuple(one.spring)),
             }
             for one in self._held
         ]
@@ -446,6 +505,7 @@ class ConstraintSet:
             "is_closed": self.is_closed,
             "before": self.rows.before.copy(),
             "after": self.rows.after.copy(),
+            "multipliers": self.rows.multipliers.copy(),
             "twist": {name: getattr(self.rows.twist, name).copy() for name in _REMEMBERED},
             "compliant": [hold.number for hold in self._compliant],
             "mean_force": self.rows.response.force.copy(),
@@ -466,7 +526,7 @@ class ConstraintSet:
         self._n_made = max(self._n_made, take_count(state, "n_made"))
         self._rebuild()
         rows, twist = self.rows, take(state, "twist")
-        for name in ("before", "after"):
+        for name in ("before", "after", "multipliers"):
             getattr(rows, name)[:] = take_array(state, name, getattr(rows, name).shape)
         for name in _REMEMBERED:
             part = getattr(rows.twist, name)
@@ -497,7 +557,8 @@ class ConstraintSet:
         n_rows = d + is_clamp * (d - 1 + self._spline.has_theta)
         hold = Hold(take_count(one, "number"), self._spline.check_place(place), is_clamp)
         position = self._spline.check_position(take_array(one, "position", (3,)))
-        return self._make_held(hold, position, tangent, take_array(one, "multipliers", (n_rows,)))
+        spring = Spring(*take_array(one, "spring", (4,), is_finite=False).tolist())
+        return self._make_held(hold, position, tangent, np.zeros(n_rows), spring)
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -574,30 +635,61 @@ class ConstraintSet:
                 after[own.stop - 1] = before[own.stop - 1]
                 twist.turn_rows[self._clamps.index(held.hold.number)] = own.stop - 1
             multipliers[own] = held.multipliers
-            # A view: what the kernels write belongs to the hold.
+            # Views: what the kernels write belongs to the hold.
             held.multipliers, held.first = multipliers[own], first
+            target = slice(first, first + d)
+            if held.spring.stiffness < np.inf:
+                before[target] = after[target] if held.before is None else held.before
+            if held.tangent is not None and held.spring.turn_stiffness < np.inf:
+                before[first + d : first + 2 * d - 1] = 0.0
+            held.before = before[target]
             first = own.stop
         if self.is_closed:
             coefficients[first:] = loops.make_joint_rows(self._spline)
             before[first:] = coefficients[first:, :width] @ self._x[:width]
             before[first:] += coefficients[first:, width:] @ self._x[-width:]
         self._compliant = []
-        response = records.make_response(0)
-        return records.Constraints(start, coefficients, before, after, multipliers, twist, response)
+        whole = (start, coefficients, before, after, multipliers, twist, records.make_response(0))
+        return records.Constraints(*whole, self._make_springs(m))
+
+    def _make_springs(self, n_rows: int) -> records.Springs:
+        """Makes the springs of the holds that have one."""
+        d, sprung = self._spline.dimension, [one for one in self._held if one.spring != _RIGID]
+        rows = [(one.first, (d - 1) * (one.tangent is not None)) for one in sprung]
+        numbers = np.array([astuple(one.spring) for one in sprung], dtype=np.float64)
+        places = np.array(rows, dtype=np.int64).reshape(-1, 2)
+        return records.make_springs(places, numbers.reshape(-1, 4), n_rows)
+
+    def list_stiffnesses(self) -> Array:
+        """The stiffness of each row, (m,), N/m of a place or N m of a slope; infinite for rigid."""
+        d, found = self._spline.dimension, np.full(len(self.rows.start), np.inf)
+        for one in self._held:
+            found[one.first : one.first + d] = one.spring.stiffness
+            if one.tangent is not None:
+                slopes = slice(one.first + d, one.first + 2 * d - 1)
+                found[slopes] = one.spring.turn_stiffness
+        return found
+
+    def ready_springs(self) -> None:
+        """Readies springs for `newton.is_positive`: each at rest and below its limit."""
+        springs = self.rows.springs
+        springs.softness[:] = 1.0 / springs.numbers[:, [0, 0, 3]]
+        springs.direction[:], springs.scale[:] = 0.0, 1.0
+        springs.weight[:] = 0.5 * self.list_stiffnesses()
 
     def _aim(self, held: _Held, turns: bool) -> None:
         """What `_rebuild` does for a hold with another position or, if it turns, tangent."""
         d, rows = self._spline.dimension, self.rows
-        own = slice(held.first, held.first + len(held.multipliers))
         start, width = rows.start[held.first], 4 * self._spline.n_dof
         if turns and held.tangent is not None:
             slopes = slice(held.first + d, held.first + 2 * d - 1)
             rows.rows[slopes, :width] = self._make_slope_rows(held, held.tangent).reshape(-1, width)
-        rows.before[own] = rows.rows[own, :width] @ self._x[start : start + width]
+            # Added up in order, as kernels do; what does not turn stands where a step has left it.
+            made = rows.rows[slopes, :width] * self._x[start : start + width]
+            is_rigid = held.spring.turn_stiffness == np.inf
+            rows.before[slopes] = np.cumsum(made, axis=1)[:, -1] if is_rigid else 0.0
         wanted = (held.position - self._spline.offset)[self._spline.dims]
         rows.after[held.first : held.first + d] = wanted
-        if turns and self._spline.has_theta:
-            rows.after[own.stop - 1] = rows.before[own.stop - 1]
 
     def _make_own_rows(self, held: _Held) -> Array:
         """Coefficients of one hold's rows."""

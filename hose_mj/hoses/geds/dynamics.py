@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +30,8 @@ from hose_mj.hoses.geds.morison import add_fluid
 from hose_mj.hoses.geds.self_contact import accept_self_contact, add_self_contact
 from hose_mj.hoses.geds.twist import accept_twist
 from hose_mj.hoses.health import HealthWatch
-from hose_mj.hoses.protocol import Array, Linearization
+from hose_mj.hoses.paths import HoldPath
+from hose_mj.hoses.protocol import Array, Hold, Linearization
 
 _ENDLESS = float(np.finfo(np.float64).max)
 """A step that changes no velocity (s), yet is finite: contact takes an infinite one for statics."""
@@ -47,6 +49,9 @@ _RESET_ITERATIONS = 8
 much of the hose's own turns the iteration crawls."""
 _NO_MASSES = point_masses.make_none()
 _NO_ROWS = np.zeros(0, dtype=np.int64)
+_NO_PATH = stepping.Path(
+    _NO_ROWS, np.zeros((0, 0)), _NO_ROWS, np.zeros((0, 0, 0)), np.zeros(0, dtype=np.float64)
+)
 
 
 _ROUNDING = 1e-12
@@ -93,7 +98,7 @@ class Dynamics:
 
     def __post_init__(self) -> None:
         self.trial = integrators.make_state(len(self.state.x))
-        self._packed_of: tuple[Any, ...] = (None,) * 4
+        self._path, self._packed_of = _NO_PATH, (None,) * 5
 
     @property
     def time(self) -> float:
@@ -106,6 +111,28 @@ class Dynamics:
             self.watch.check_jump(self.constraints.measure_jump())
             self.constraints.is_moved = False
         self.check(self.run(stepping.ADVANCE, n_steps))
+        self.check_health()
+
+    def follow(self, paths: Mapping[Hold, HoldPath], n_steps: int) -> None:
+        """Takes n_steps steps, at the end of each of which holds are at a row of their paths.
+
+        Raises:
+            InputError: a hold, a row or a tangent that `move` would refuse; nothing has changed.
+            StepError: a step that no fallback finished; the steps before count.
+        """
+        path = self.constraints.make_path(paths, n_steps)
+        starts = self.constraints.rows.before[path.rows][None]
+        d = len(self.axes[:3])
+        ways = np.diff(np.concatenate([starts, path.places]), axis=0).reshape(n_steps, -1, d)
+        jump = float(np.linalg.norm(ways, axis=2).max(initial=0.0))
+        others = self.constraints.measure_jump() if self.constraints.is_moved else 0.0
+        self.watch.check_jump(max(jump, others))
+        self.constraints.is_moved, self._path = False, path
+        before = int(self.counts[STEPS])
+        verdict = self.run(stepping.FOLLOW, n_steps)
+        done = int(self.counts[STEPS]) - before
+        self.constraints.follow(paths, min(done, n_steps - 1))
+        self.check(verdict)
         self.check_health()
 
     def check_health(self) -> None:
@@ -132,17 +159,17 @@ class Dynamics:
             n_steps = min(n_steps, 1)
             self.loads.fluid.update(self.state.x)
         rows, loads = self.constraints.rows, self.loads.loads
-        parts = (rows, loads, masses, first)
+        parts = (rows, loads, masses, first, self._path)
         if any(a is not b for a, b in zip(parts, self._packed_of, strict=True)):
             self._pack(parts)
         return int(self._enter(self._packed.address, what, self._code, n_steps))
 
     def _pack(self, parts: tuple[Any, ...]) -> None:
         """Puts all that a step reads to where compiled code finds it."""
-        rows, loads, masses, first = parts
+        rows, loads, masses, first, path = parts
         session = stepping.Session(
             *(self.axes, self.hose, rows, loads, self.limits, self.timestep, self.state),
-            *(self.trial, self.counts, 1.0, masses, first, self.make_work()),
+            *(self.trial, self.counts, 1.0, masses, first, path, self.make_work()),
         )
         self._packed, self._packed_of = packing.Packed(session), parts
         self._code = integrators.SCHEMES[self.scheme]
@@ -279,6 +306,7 @@ class Dynamics:
         twist = self.constraints.rows.twist
         torque = twist.torque.copy()
         work = self.build_tangent()
+        self.constraints.ready_springs()
         length = self.hose.tables.span_length * len(self.hose.tables.first)
         mass = float(np.mean(self.hose.mass[:, 0]))
         density = float(2.0 * self.hose.mass.sum() - self.hose.mass[:, 0].sum()) / length
@@ -296,6 +324,7 @@ class Dynamics:
         """Newton's iteration at one load; a hose with theta resets its frames now and then."""
         work.start[:] = work.x_now[:] = work.X[:] = work.x[:] = x
         work.V[:] = 0.0
+        work.multipliers[:] = 0.0
         state = integrators.make_state(len(x))
         has_theta = len(self.axes) == 4
         length = self.hose.tables.span_length * len(self.hose.tables.first)
@@ -306,7 +335,7 @@ class Dynamics:
         rows, verdict = self.constraints.rows, records.NOT_CONVERGED
         session = stepping.Session(
             *(self.axes, hose, rows, self.loads.loads, limits, np.inf, self.state, self.trial),
-            *(self.counts, scale, _NO_MASSES, _NO_ROWS, work),
+            *(self.counts, scale, _NO_MASSES, _NO_ROWS, _NO_PATH, work),
         )
         packed = packing.Packed(session)
         enter = _open(stepping.advance, packed)
@@ -380,7 +409,13 @@ class Dynamics:
         newton.add_mass(self.axes, self.hose, 1.0, work.band)
         mass = mechanics.make_dense(work.band, size, width)
         mass += self.loads.fluid.compute_added_mass(self.state.x)
-        return Linearization(mass, stiffness, mechanics.make_dense_rows(rows, size, width))
+        dense, stiffnesses = (
+            mechanics.make_dense_rows(rows, size, width),
+            self.constraints.list_stiffnesses(),
+        )
+        soft = np.isfinite(stiffnesses)
+        stiffness += dense[soft].T @ (stiffnesses[soft, None] * dense[soft])
+        return Linearization(mass, stiffness, dense[~soft])
 
 
 def _open(kernel: Any, packed: packing.Packed) -> Any:

@@ -30,6 +30,7 @@ from hose_mj.hoses.geds.spline import Spline
 from hose_mj.hoses.health import Health, HealthWatch
 from hose_mj.hoses.inputs import check_count, check_records, check_rows, check_vector
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
+from hose_mj.hoses.paths import Rows, check_paths
 from hose_mj.hoses.protocol import (
     Array,
     Curve,
@@ -41,6 +42,7 @@ from hose_mj.hoses.protocol import (
 )
 from hose_mj.hoses.snapshots import take, take_array, take_count, undo
 from hose_mj.hoses.spec import HoseSpec, check_number, check_spec
+from hose_mj.hoses.springs import Spring
 
 _TURN_TOLERANCE = 2e-3
 """What a change of theta (rad) may be when Newton's iteration stops."""
@@ -262,25 +264,31 @@ class GedsHose(SplineBody):
         position: ArrayLike | None = None,
         tangent: ArrayLike | None = None,
         director: ArrayLike | None = None,
+        spring: Spring | None = None,
     ) -> Hold:
         """Holds a point, the tangent and the material's angle there; by default where they are now.
 
         Position (3,) m, tangent (3,) and director (3,), of any length above 0, are in the world
         frame; the director is where m1 is to point, its part along the tangent ignored, reached by
-        a turn of less than half. Raises `InputError` for a place off the hose or taken, and for
-        vectors out of a planar hose's plane.
+        a turn of less than half. With a spring the hold gives way by it, place and tangent, and
+        `move` moves its target. Raises `InputError` for a place off the hose or taken, for vectors
+        out of a planar hose's plane, and for a spring with an explicit scheme.
         """
+        self._check_spring(spring)
         place = self._spline.check_place(arc_length)
         aim = self._spline.check_direction(self.tangent(place)[0] if tangent is None else tangent)
         across = None if director is None else self._constraints.check_director(director, aim)
-        hold = self._constraints.add(arc_length, position, aim)
+        hold = self._constraints.add(arc_length, position, aim, spring)
         if across is not None:
             self._constraints.turn_to(hold, across)
         return hold
 
-    def attach(self, arc_length: float, position: ArrayLike | None = None) -> Hold:
+    def attach(
+        self, arc_length: float, position: ArrayLike | None = None, spring: Spring | None = None
+    ) -> Hold:
         """Holds a point and leaves the tangent free; by default where it is now. See `clamp`."""
-        return self._constraints.add(arc_length, position, None)
+        self._check_spring(spring)
+        return self._constraints.add(arc_length, position, None, spring)
 
     def move(
         self,
@@ -402,6 +410,17 @@ class GedsHose(SplineBody):
         self._warn_of_spin()
         self._dynamics.advance(int(n_steps))
 
+    def follow(self, positions: Rows, tangents: Rows | None = None) -> None:
+        """Takes as many steps as paths have rows; see `HoseModel.follow`. One compiled call.
+
+        Bit by bit what `move` and `step` do in turn, but that all rows are looked at first: one
+        that is refused, or a jump with `strict`, changes nothing.
+        """
+        n_steps, paths = check_paths(positions, tangents)
+        if n_steps > 0:
+            self._warn_of_spin()
+            self._dynamics.follow(paths, n_steps)
+
     @property
     def health(self) -> Health:
         """How well it went since the last reset."""
@@ -488,6 +507,10 @@ class GedsHose(SplineBody):
                 f"GedsHose.{name} is now GedsHose.{moved}", DeprecationWarning, stacklevel=2
             )
             return operator.attrgetter(moved)(self)
+
+    def _check_spring(self, spring: Spring | None) -> None:
+        if spring is not None and self.scheme == "verlet":
+            raise InputError("scheme", self.scheme, "an implicit scheme for a hold with a spring")
 
     def _warn_of_spin(self) -> None:
         """Says that moments about the tangent have nothing that would balance them, if so."""

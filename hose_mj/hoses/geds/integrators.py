@@ -43,6 +43,7 @@ class State(NamedTuple):
         x_old, v_old: the same one step earlier (BDF2).
         a: acceleration at the end of the last step, for the predictor.
         started: (1,), 1.0 once x_old and v_old hold a step.
+        work: done by dead loads, gravity and holds so far, (1,), J.
     """
 
     x: Array
@@ -51,6 +52,7 @@ class State(NamedTuple):
     v_old: Array
     a: Array
     started: Array
+    work: Array
 
 
 STEPS, ITERATIONS, FALLBACKS, RETRIES = range(4)
@@ -61,7 +63,7 @@ step had to be tried another way."""
 def make_state(size: int) -> State:
     """Returns a state of `size` unknowns, all zero."""
     x, v, x_old, v_old, a = (np.zeros(size) for _ in range(5))
-    return State(x, v, x_old, v_old, a, np.zeros(1))
+    return State(x, v, x_old, v_old, a, np.zeros(1), np.zeros(1))
 
 
 ATTEMPTS = 6
@@ -145,6 +147,9 @@ def _try_step(address, constraints, limits, scheme, dt, parts, state, work, coun
     response = constraints.response
     for row in range(len(response.compliance)):
         response.gathered[row] = 0.0
+    # Springs begin from what they did before.
+    for row in range(len(constraints.start)):
+        work.multipliers[row] = constraints.multipliers[row]
     for part in range(parts):
         for stage in range(n_stages):
             h, end = _set_up_stage(scheme, stage, dt / parts, state, work)
@@ -289,9 +294,20 @@ def _step_verlet(axes, hose, constraints, loads, dt, state, work):
 
 
 @inlined
-def _keep_multipliers(constraints, work, counts):
-    """Counts a step that is done and keeps its multipliers and mean forces."""
+def _keep_multipliers(axes, constraints, loads, state, work, counts):
+    """Counts a step that is done and its work, and keeps its multipliers and mean forces.
+
+    Holds count with the mean of their forces at both ends of the step.
+    """
     counts[STEPS] += 1
+    done, size = 0.0, len(state.x)
+    for k in range(size):
+        done += loads.force[k] * (state.x[k] - state.x_old[k])
+    for row in range(len(constraints.start)):
+        way = multiply_row(axes, constraints, row, state.x, size)
+        way -= multiply_row(axes, constraints, row, state.x_old, size)
+        done += 0.5 * (constraints.multipliers[row] + work.multipliers[row]) * way
+    state.work[0] += done
     for row in range(len(constraints.start)):
         constraints.multipliers[row] = work.multipliers[row]
     response = constraints.response
@@ -301,14 +317,14 @@ def _keep_multipliers(constraints, work, counts):
 
 
 @merged
-def take_step(address, axes, constraints, limits, scheme, dt, state, work, counts):
+def take_step(address, axes, constraints, loads, limits, scheme, dt, state, work, counts):
     """Takes one step of an implicit scheme, but for what `end_step` does; returns a verdict.
 
     The records are those of the session at the address, but for the state.
     """
     verdict = _step_implicit(address, axes, constraints, limits, scheme, dt, state, work, counts)
     if verdict == DONE:
-        _keep_multipliers(constraints, work, counts)
+        _keep_multipliers(axes, constraints, loads, state, work, counts)
     return verdict
 
 
@@ -317,7 +333,7 @@ def take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts):
     """`take_step` for Verlet, apart from it: compiled only for those who use it."""
     verdict = _step_verlet(axes, hose, constraints, loads, dt, state, work)
     if verdict == DONE:
-        _keep_multipliers(constraints, work, counts)
+        _keep_multipliers(axes, constraints, loads, state, work, counts)
     return verdict
 
 
@@ -345,4 +361,4 @@ def copy_state(source, target):
     for k in range(len(source.x)):
         target.x[k], target.v[k], target.a[k] = source.x[k], source.v[k], source.a[k]
         target.x_old[k], target.v_old[k] = source.x_old[k], source.v_old[k]
-    target.started[0] = source.started[0]
+    target.started[0], target.work[0] = source.started[0], source.work[0]

@@ -49,11 +49,62 @@ def add_constraint_weight(axes, constraints, weight, size, work):
         for k in range(width):
             norm += constraints.rows[row, k] ** 2
         factor = weight * mean / norm
+        if len(constraints.springs.rows) > 0:
+            factor = min(factor, constraints.springs.weight[row])
+            constraints.springs.weight[row] = factor
         for j in range(width):
             along = factor * constraints.rows[row, j]
             work.gradient[start + j] -= along * work.shift[row]
             for i in range(j, width):
                 work.band[start + j, i - j] += along * constraints.rows[row, i]
+    _soften(axes, constraints.springs)
+
+
+@inlined
+def _soften(axes, springs):
+    """Takes from springs what their weight has put into the matrix: D becomes D / (1 - weight D).
+
+    The multipliers are then less than the forces, by as much.
+    """
+    for p in range(len(springs.rows)):
+        first, n_slopes = springs.rows[p, 0], springs.rows[p, 1]
+        for k in range(3 if n_slopes > 0 else 2):
+            weight = springs.weight[first + (len(axes[:3]) if k == 2 else 0)]
+            springs.scale[p, k] = 1.0 / (1.0 - weight * springs.softness[p, k])
+            springs.softness[p, k] *= springs.scale[p, k]
+
+
+@inlined
+def _scale_forces(axes, springs, multipliers):
+    """Makes forces of the multipliers of springs; see `_soften`."""
+    d = len(axes[:3])
+    for p in range(len(springs.rows)):
+        first, n_slopes = springs.rows[p, 0], springs.rows[p, 1]
+        along = 0.0
+        for c in range(d):
+            along += springs.direction[p, c] * multipliers[first + c]
+        along *= springs.scale[p, 1] - springs.scale[p, 0]
+        for c in range(d):
+            multipliers[first + c] *= springs.scale[p, 0]
+            multipliers[first + c] += along * springs.direction[p, c]
+        for row in range(first + d, first + d + n_slopes):
+            multipliers[row] *= springs.scale[p, 2]
+
+
+@inlined
+def _add_springs(axes, springs, matrix):
+    """Adds the softness of springs to the lower half of lambda's matrix."""
+    d = len(axes[:3])
+    for p in range(len(springs.rows)):
+        first, n_slopes = springs.rows[p, 0], springs.rows[p, 1]
+        across, along = springs.softness[p, 0], springs.softness[p, 1]
+        for i in range(d):
+            matrix[first + i, first + i] += across
+            for j in range(i + 1):
+                part = springs.direction[p, i] * springs.direction[p, j]
+                matrix[first + i, first + j] += (along - across) * part
+        for row in range(first + d, first + d + n_slopes):
+            matrix[row, row] += springs.softness[p, 2]
 
 
 @inlined
@@ -61,10 +112,11 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
     """Solves K dx - R^T lambda = -gradient, R dx + D lambda = shift with the factor in work.band.
 
     The rows R are those of the constraints (D = compliance of their response times
-    `compliance_factor`), the derivatives of the segments' twist (D = compliance times `softness`)
-    and those in work.soft, which add R^T R / D to K. Writes dx into work.gradient and lambda into
-    work.multipliers. With K = L S L^T, S the signs of the pivots: Z = L^-1 R^T, and Z^T S Z + D is
-    the matrix of lambda, so each row costs one forward solve.
+    `compliance_factor`, or the softness of their springs), the derivatives of the segments' twist
+    (D = compliance times `softness`) and those in work.soft, which add R^T R / D to K. Writes dx
+    into work.gradient and lambda into work.multipliers. With K = L S L^T, S the signs of the
+    pivots: Z = L^-1 R^T, and Z^T S Z + D is the matrix of lambda, so each row costs one forward
+    solve.
 
     Returns DONE; DEPENDENT_CONSTRAINTS if the rows depend on each other; NOT_POSITIVE where K with
     D is not positive definite on the null space of the constraints, which is where that matrix has
@@ -80,6 +132,7 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
         for k in range(size):
             z[m, k] *= work.signs[k]
     _make_schur(m, constraints, softness, n_negative, size, work)
+    _add_springs(axes, constraints.springs, work.schur)
     wanted = n_negative + work.soft.used[1]
     if len(constraints.response.compliance) > 0:
         _add_compliance(m, compliance_factor, constraints.response.compliance, work.schur)
@@ -97,6 +150,7 @@ def solve_with_constraints(axes, constraints, compliance_factor, softness, n_neg
     for k in range(size, size + width):
         work.gradient[k] = 0.0
     solve_upper(axes, size, work.band, work.gradient)
+    _scale_forces(axes, constraints.springs, work.multipliers)
     return DONE
 
 

@@ -43,6 +43,12 @@ _LEAST_FACTOR, _MOST_FACTOR = 0.1, 0.7
 _STUCK = 10.0
 """A residual that is within so many times the tolerance after the last iteration, where points go
 on between sticking and sliding, ends a stage all the same, as a fallback."""
+_YIELDING = 1e3
+"""How much softer a spring at its largest force is along that force than across it: its true
+stiffness there is zero, which a matrix of compliances cannot say."""
+_ACROSS = 1e-3
+"""Of EA over a span: about what a hose under tension resists across itself, where no inertia
+does."""
 _ROUNDING = 1e-9
 """Of EA: forces below it are not told from rounding, which is 1e-16 EA over a span's share of L."""
 
@@ -230,13 +236,13 @@ def newton(address, h, fraction, limits):
         build(axes, hose, stage, twist, fraction, loads, scale, exact, x, work)
         # Constraints not yet met come first: the line search starts from a point that meets them.
         if limits.line_search and exact and iteration > 2 and shortened < _MOST_SHORTENINGS:
-            shorter = _shorten(factor, slope, work)
+            shorter = _shorten(constraints.springs, factor, slope, work)
             if shorter != factor:
                 _move(twist, shorter - factor, x, work)
                 factor = shorter
                 shortened += 1
                 continue
-        _prepare_constraints(axes, constraints, fraction, limits.constraint_weight, x, work)
+        _prepare_constraints(axes, hose, constraints, stage, fraction, loads, limits, x, work)
         verdict = _solve(axes, constraints, fraction, softness, exact, limits, len(x), work)
         if verdict == NOT_POSITIVE and exact:
             exact = False
@@ -330,8 +336,13 @@ def _measure_left(axes, hose, stage, constraints, fraction, loads, x, work):
 
 
 @inlined
-def _shorten(factor, slope, work):
-    """Returns a shorter factor for work.step where it runs past the lowest point, else factor."""
+def _shorten(springs, factor, slope, work):
+    """Returns a shorter factor for work.step where it runs past the lowest point, else factor.
+
+    The gradient knows nothing of springs: with any the whole step is taken.
+    """
+    if len(springs.rows) > 0:
+        return factor
     turned = 0.0
     for k in range(len(work.step)):
         turned += work.gradient[k] * work.step[k]
@@ -393,7 +404,60 @@ _shift_clamps = choose_by_unknowns({4: _shift})
 
 
 @inlined
-def _prepare_constraints(axes, constraints, fraction, weight, x, work):
+def _prepare_springs(axes, hose, constraints, stage, dt, x, work):
+    """Writes the softness of springs, and into work.shift what they are to give way by.
+
+    A spring does K y to the hose at the place after the step dx to come, K = k + c / h and
+    K y = k gap + c gap', as long as that is below its largest force F: G dx + lambda / K = y.
+    Beyond, lambda = F t / |t| with t = lambda + r (y - G dx - lambda / K), as for Coulomb's law
+    (Alart and Curnier 1991); any r has the same solution, and one like the hose's own stiffness
+    finds it however stiff the spring is.
+    """
+    h, X, _ = stage
+    d, size, springs, span = len(axes[:3]), len(x), constraints.springs, hose.tables.span_length
+    own = hose.density * span / (h * h) + _ACROSS * hose.elasticity.axial_stiffness[0] / span
+    for row in range(len(springs.weight)):
+        springs.weight[row] = np.inf
+    for p in range(len(springs.rows)):
+        first, stiffness = springs.rows[p, 0], springs.numbers[p, 0]
+        for k in range(3):
+            springs.softness[p, k] = springs.direction[p, k] = 0.0
+            springs.scale[p, k] = 1.0
+        springs.softness[p, 2] = 1.0 / springs.numbers[p, 3]
+        for row in range(first + d, first + d + springs.rows[p, 1]):
+            springs.weight[row] = 0.5 * springs.numbers[p, 3]
+        if stiffness == np.inf:
+            continue
+        # Nothing moves in a stage without end.
+        damping = springs.numbers[p, 1] if h < np.inf else 0.0
+        whole = stiffness + damping / h
+        r = min(whole, own)
+        square = 0.0
+        for c in range(d):
+            row = first + c
+            rate = (constraints.after[row] - constraints.before[row]) / dt
+            rate -= multiply_row(axes, constraints, row, x, size) / h
+            rate += multiply_row(axes, constraints, row, X, size) / h
+            work.shift[row] = (stiffness * work.shift[row] + damping * rate) / whole
+            pull = work.multipliers[row] * (1.0 - r / whole) + r * work.shift[row]
+            springs.direction[p, c] = pull
+            square += pull * pull
+        over = np.sqrt(square) / springs.numbers[p, 2]
+        across = (max(over, 1.0) - 1.0 + r / whole) / r
+        along = across * _YIELDING if over > 1.0 else across
+        springs.softness[p, 0], springs.softness[p, 1] = across, along
+        gap = 0.0
+        for c in range(d):
+            springs.weight[first + c] = 0.5 / along
+            springs.direction[p, c] *= 1.0 / np.sqrt(square) if over > 1.0 else 0.0
+            gap += springs.direction[p, c] * work.shift[first + c]
+        for c in range(d):
+            aim = along * springs.numbers[p, 2] - gap if over > 1.0 else 0.0
+            work.shift[first + c] += aim * springs.direction[p, c]
+
+
+@inlined
+def _prepare_constraints(axes, hose, constraints, stage, fraction, loads, limits, x, work):
     """Writes g - G x into work.shift and adds the constraints' weight to the matrix."""
     for row in range(len(constraints.start)):
         before = constraints.before[row]
@@ -403,8 +467,9 @@ def _prepare_constraints(axes, constraints, fraction, weight, x, work):
             wanted -= fraction * response.compliance[row, other] * response.base[other]
         work.shift[row] = wanted - multiply_row(axes, constraints, row, x, len(x))
     _shift_clamps(axes, constraints.twist, fraction, work.shift)
-    if weight > 0.0:
-        add_constraint_weight(axes, constraints, weight, len(x), work)
+    _prepare_springs(axes, hose, constraints, stage, loads.contact.law[TIMESTEP], x, work)
+    if limits.constraint_weight > 0.0:
+        add_constraint_weight(axes, constraints, limits.constraint_weight, len(x), work)
 
 
 @compiled

@@ -74,6 +74,37 @@ def make_response(n_rows: int) -> Response:
     return Response(np.zeros((n_rows, n_rows)), base, np.ones(1), gathered, force)
 
 
+class Springs(NamedTuple):
+    """Holds that give way by a spring and a damper, p of them, among the m rows of G.
+
+    Attributes:
+        rows: first row of each, and how many rows of slopes it has, (p, 2).
+        numbers: stiffness k (N/m), damping c (N s/m), largest force (N) and stiffness against turns
+            (N m/rad), (p, 4); an infinite stiffness does not give way.
+        softness: by what a force changes the place of each, across the direction of its force and
+            along it (m/N), and a moment its slope (1/(N m)), in one iteration, (p, 3), written.
+        direction: unit vector of a force at its limit, (p, 3), zero below it, written.
+        scale: of its forces over their multipliers, likewise, (p, 3), written.
+        weight: most that G^T G may weigh in the matrix, and what it does, (m,), written.
+    """
+
+    rows: np.ndarray
+    numbers: Array
+    softness: Array
+    direction: Array
+    scale: Array
+    weight: Array
+
+
+def make_springs(rows: np.ndarray, numbers: Array, n_rows: int) -> Springs:
+    """Returns springs with these rows (p, 2) and numbers (p, 4) among `n_rows` rows."""
+    softness, direction, scale = np.zeros((3, len(rows), 3))
+    return Springs(rows, numbers, softness, direction, scale, np.full(n_rows, np.inf))
+
+
+NO_SPRINGS = make_springs(np.zeros((0, 2), dtype=np.int64), np.zeros((0, 4)), 0)
+
+
 class Constraints(NamedTuple):
     """m rows of G x = g: clamps, attachments and the joint of a closed loop.
 
@@ -86,6 +117,7 @@ class Constraints(NamedTuple):
         multipliers: lambda at the end of the last step, (m,), written.
         twist: clamps and the twist between them.
         response: of the bodies that hold the hose.
+        springs: holds that give way by themselves.
     """
 
     start: np.ndarray
@@ -95,6 +127,7 @@ class Constraints(NamedTuple):
     multipliers: Array
     twist: Twist
     response: Response
+    springs: Springs = NO_SPRINGS
 
 
 class Loads(NamedTuple):

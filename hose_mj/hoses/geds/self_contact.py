@@ -51,6 +51,9 @@ _LOOKS = 8
 """Newton steps, kept within their bracket, to the nearest place of a cubic: three are the rule."""
 _MOVE = 0.5
 """Newton's steps change what is near by so many radii at most: beyond, its sides are not known."""
+_HARDEST = 5.0
+"""Half a radius deep, where no force that the hose bears comes to, the law hardens no more: strands
+that are laid into each other are pushed apart and not flung."""
 _NO_EFFECT = 1e200
 """Compliance of a row without effect (m/N)."""
 MATES = 2
@@ -344,7 +347,11 @@ def _compute_pair(contact, k, distance, n, moved, away, step):
     push, slope = make_push(law[SELF_WIDTH], distance - 2.0 * law[RADIUS])
     harder = push / law[HARDENING]
     stiffness = 0.5 * law[SELF_SCALE] * law[STIFFNESS]
-    slope *= stiffness * (1.0 + 3.0 * harder * harder)
+    if harder < _HARDEST:
+        slope *= stiffness * (1.0 + 3.0 * harder * harder)
+    else:
+        harder = _HARDEST
+        slope *= stiffness * (1.0 + harder * harder)
     N = stiffness * push * (1.0 + harder * harder) - law[DAMPING] * slope * away
     zero = (0.0, 0.0, 0.0)
     if N <= 0.0:

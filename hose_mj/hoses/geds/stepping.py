@@ -24,11 +24,29 @@ from hose_mj.hoses.geds.packing import unpack
 from hose_mj.hoses.geds.point_masses import NEAR, PointMasses, aim, is_clear, move, move_shapes
 from hose_mj.hoses.geds.records import DONE, Constraints, Hose, Limits, Loads, Work
 from hose_mj.hoses.protocol import Array
-from hose_mj.jit import kernel
+from hose_mj.jit import bitwise, kernel
 
-ADVANCE, TRY, ACCEPT, SETTLE = range(4)
-"""What `advance` is to do: steps, one step into `trial`, to make that one count, or one solve of
-statics in the work arrays."""
+ADVANCE, TRY, ACCEPT, FOLLOW, SETTLE = range(5)
+"""What `advance` is to do: steps, one step into `trial`, to make that one count, steps along a
+path, or one solve of statics in the work arrays."""
+
+
+class Path(NamedTuple):
+    """Where holds are to be at the end of each of n steps.
+
+    Attributes:
+        rows: of the constraints whose g changes, (k,).
+        places: their g, (n, k).
+        slopes: rows of the constraints that turn, (l,).
+        coefficients: of these, (n, l, 4 d).
+        yields: 1.0 for those with a spring, whose g is always 0, (l,).
+    """
+
+    rows: np.ndarray
+    places: Array
+    slopes: np.ndarray
+    coefficients: Array
+    yields: Array
 
 
 class Session(NamedTuple):
@@ -45,6 +63,7 @@ class Session(NamedTuple):
         load_scale: what loads are multiplied by: 1 but in statics.
         masses: at its attachments; none but where bodies are stepped with it.
         first: first rows of the masses' constraints, (k,).
+        path: that `FOLLOW` goes.
         work: work arrays.
     """
 
@@ -60,7 +79,30 @@ class Session(NamedTuple):
     load_scale: float
     masses: PointMasses
     first: np.ndarray
+    path: Path
     work: Work
+
+
+@bitwise
+def _measure_slope(constraints, row, width, x):
+    """What a row makes of x, added up in order: `ConstraintSet.move` does the same."""
+    value = 0.0
+    for k in range(width):
+        value += constraints.rows[row, k] * x[constraints.start[row] + k]
+    return value
+
+
+@kernel
+def _aim_holds(axes, constraints, path, k, x):
+    """Sets where holds are to be at the end of step k of a path."""
+    for j in range(len(path.rows)):
+        constraints.after[path.rows[j]] = path.places[k, j]
+    for j in range(len(path.slopes)):
+        row, width = path.slopes[j], path.coefficients.shape[2]
+        for i in range(width):
+            constraints.rows[row, i] = path.coefficients[k, j, i]
+        turned = 0.0 if path.yields[j] > 0.0 else _measure_slope(constraints, row, width, x)
+        constraints.before[row] = turned
 
 
 @kernel
@@ -73,7 +115,8 @@ def advance(address, what, scheme, n_steps):
     session = unpack(address)
     axes, hose, constraints, loads = session.axes, session.hose, session.constraints, session.loads
     limits, dt, own, trial = session.limits, session.timestep, session.state, session.trial
-    counts, masses, first, work = session.counts, session.masses, session.first, session.work
+    counts, masses, first = session.counts, session.masses, session.first
+    path, work = session.path, session.work
     if what == SETTLE:
         verdict, iterations, fallbacks = newton(address, np.inf, 1.0, limits)
         counts[ITERATIONS] += iterations
@@ -82,7 +125,9 @@ def advance(address, what, scheme, n_steps):
     if what == TRY:
         copy_state(own, trial)
     state = trial if what == TRY else own
-    for _ in range(n_steps):
+    for k in range(n_steps):
+        if what == FOLLOW:
+            _aim_holds(axes, constraints, path, k, state.x)
         if what == ACCEPT:
             copy_state(trial, state)
         else:
@@ -90,7 +135,9 @@ def advance(address, what, scheme, n_steps):
                 if not is_clear(masses, dt):
                     return NEAR
                 aim(axes, constraints, masses, first, dt)
-            verdict = take_step(address, axes, constraints, limits, scheme, dt, state, work, counts)
+            verdict = take_step(
+                address, axes, constraints, loads, limits, scheme, dt, state, work, counts
+            )
             if verdict != DONE or what == TRY:
                 return verdict
         end_step(axes, hose, constraints, loads.contact, state, work.span)
@@ -121,7 +168,9 @@ def advance_verlet(address, what, scheme, n_steps):
     session = unpack(address)
     axes, hose, constraints, loads = session[:4]
     dt, state, counts, work = session.timestep, session.state, session.counts, session.work
-    for _ in range(n_steps):
+    for k in range(n_steps):
+        if what == FOLLOW:
+            _aim_holds(axes, constraints, session.path, k, state.x)
         verdict = take_verlet_step(axes, hose, constraints, loads, dt, state, work, counts)
         if verdict != DONE:
             return verdict

@@ -24,6 +24,7 @@ from hose_mj.hoses.mujoco.chain_holds import Held, Load, stack_rows
 from hose_mj.hoses.mujoco.chain_settings import ChainSettings
 from hose_mj.hoses.mujoco.flex_layout import FlexMotion
 from hose_mj.hoses.mujoco.model import MujocoModel
+from hose_mj.hoses.paths import Rows, follow_in_steps
 from hose_mj.hoses.protocol import (
     Array,
     Curve,
@@ -264,6 +265,13 @@ class MujocoHose(ABC):
             return
         self._model.step(n_steps, self._held, self._loads)
         self._held = [held.arrived() for held in self._held]
+
+    def follow(self, positions: Rows, tangents: Rows | None = None) -> None:
+        """Takes as many steps as paths have rows; see `HoseModel.follow`.
+
+        A row that `move` refuses ends it there.
+        """
+        follow_in_steps(self, positions, tangents)
 
     def solve_static(self) -> Equilibrium:
         """Moves the hose to static equilibrium under its holds and loads, velocity zero.

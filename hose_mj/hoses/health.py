@@ -5,15 +5,30 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 from hose_mj.errors import HoseWarning, StepError
+from hose_mj.hoses.entanglement import compute_least_distance, compute_writhe
+from hose_mj.hoses.protocol import Array
 
 MOST_RETRIES = 0.5  # a step; impacts on thin walls take 0.3, free motions none
 DEEPEST = 0.3  # radii; the default law sinks 0.2 at the tension that breaks a hose
+SHARPEST = 0.7  # rad a span: the ratio of the pulls round a post is then off by 2 % (physics.md)
 LARGEST_STRAIN = 0.01  # as laid
 LARGEST_JUMP = 0.1  # of the length; what moves farther in a step throws the hose
-EVERY = 64  # steps between two looks at the retries
+EVERY = 64  # steps between two looks at retries and mesh
+
+
+class Line(NamedTuple):
+    """A centre line at one time."""
+
+    points: Array  # evenly along it, (k, 3), m
+    length: float  # m
+    radius: float  # of the hose (m)
+    is_closed: bool
+    turns: float  # its twist less what clamps were spun by, in turns
 
 
 @dataclass(frozen=True)
@@ -23,11 +38,36 @@ class Health:
     steps: int  # done
     retry_share: float  # how often a step had to be tried another way, of all steps
     deepest_contact: float  # in radii of the hose; above 0 inside the surface
+    sharpest_contact: float  # turn of the tangent in a span round what it touches (rad)
     least_stretch: float  # |r'| now: 1 as long as at rest, near 0 folded
     laid_strain: float  # the largest as `reset` laid it
     largest_jump: float  # of a hold within a step (m)
     crossings: int  # contact points that passed through another part of the hose
     warnings: tuple[str, ...]  # all that was said
+    # Energy beyond what loads and holds have put in (J), below 0 where it was lost; nan where their
+    # work is not known: moments, spins, moving surfaces, bodies that feel the hose.
+    energy_gained: float
+    line: Line = field(repr=False, compare=False)  # the centre line now
+    begun: Line | None = field(repr=False, compare=False)  # when its ends were last taken hold of
+
+    @cached_property
+    def least_distance(self) -> float:
+        """Least distance between centre lines of parts more than 6 radii apart, in radii."""
+        line, radius = self.line, self.line.radius
+        apart = 6.0 * radius
+        return compute_least_distance(line.points, line.length, apart, line.is_closed) / radius
+
+    @cached_property
+    def lost_links(self) -> int | None:
+        """By how much twist plus writhe has changed without a spin: 2 for each passage.
+
+        None where that may change: unless the hose is closed, or clamped at both ends with tangents
+        that stay as they are.
+        """
+        if self.begun is None:
+            return None
+        links = [line.turns + compute_writhe(line.points) for line in (self.begun, self.line)]
+        return 2 * round((links[1] - links[0]) / 2.0)
 
 
 class HealthWatch:
@@ -46,7 +86,7 @@ class HealthWatch:
         """Begins anew; `retries` is how many there were before."""
         self._said: dict[str, str] = {}
         self._retries_before, self._looked = retries, (0, retries)
-        self.largest_jump = self.laid_strain = 0.0
+        self.largest_jump = self.laid_strain = self.sharpest = 0.0
 
     def resume(self, steps: int, retries: int) -> None:
         """Goes on from counts that a snapshot has brought back."""
@@ -85,8 +125,18 @@ class HealthWatch:
                 f"hose: move it by at most {LARGEST_JUMP * self._length:.3g} m a step",
             )
 
-    def check_steps(self, steps: int, retries: int, deepest: float, crossings: int) -> None:
-        """Looks at what was counted so far; `deepest` is in radii."""
+    def check_steps(
+        self,
+        steps: int,
+        retries: int,
+        deepest: float,
+        crossings: int,
+        measure_turn: Callable[[], float],
+    ) -> None:
+        """Looks at what was counted so far; `deepest` is in radii.
+
+        The sharpest turn of a span in contact (rad) is measured now and then.
+        """
         if deepest > DEEPEST:
             self._tell(
                 "contact",
@@ -102,6 +152,14 @@ class HealthWatch:
         before, known = self._looked
         if steps - before >= EVERY:
             self._looked = steps, retries
+            self.sharpest = max(self.sharpest, measure_turn())
+            if self.sharpest > SHARPEST:
+                self._tell(
+                    "mesh",
+                    f"a surface bends the hose by {self.sharpest:.2g} rad within one span, which a "
+                    "span cannot follow: take more control points, so that it is "
+                    f"{0.7 * SHARPEST:.1g} at most",
+                )
             share = (retries - known) / (steps - before)
             if share > MOST_RETRIES:
                 self._tell(
@@ -116,13 +174,16 @@ class HealthWatch:
         retries: int,
         deepest: float,
         crossings: int,
+        turn: float,
         measure_stretch: Callable[[], float],
+        *rest: Any,
     ) -> Health:
-        """All of it."""
+        """All of it; `turn` is that of a span in contact now (rad), `rest` what is not watched."""
         share = (retries - self._retries_before) / max(steps, 1)
         said = tuple(self._said.values())
-        numbers = (measure_stretch(), self.laid_strain, self.largest_jump, crossings)
-        return Health(steps, share, deepest, *numbers, said)
+        self.sharpest = max(self.sharpest, turn)
+        numbers = (self.sharpest, measure_stretch(), self.laid_strain, self.largest_jump, crossings)
+        return Health(steps, share, deepest, *numbers, said, *rest)
 
     def _tell(self, kind: str, text: str) -> None:
         if kind in self._said:

@@ -39,6 +39,7 @@ CASES: tuple[Case, ...] = (
     motions.make_taut_pull(),
     motions.make_suture_pull(),
     motions.make_capstan(),
+    motions.make_held_capstan(),
     motions.make_floor_tow(),
     motions.make_obstacle_drop(),
 )

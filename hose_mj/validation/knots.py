@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from hose_mj.checks import Check
+from hose_mj.hoses.entanglement import compute_writhe
 from hose_mj.hoses.geds.hose import GedsHose
 from hose_mj.hoses.obstacles import ContactLaw
 from hose_mj.hoses.protocol import Array
@@ -181,36 +182,6 @@ def measure_knot(is_quick: bool, rng: np.random.Generator) -> Findings:
     return Findings(checks, {"knot": plot})
 
 
-def measure_writhe(places: Array) -> float:
-    """Writhe of a polyline (k, 3), turns, by sums over its pairs of pieces.
-
-    Klenin and Langowski, Biopolymers 54, 307 (2000), method 1a; its error falls with k^-2.
-    """
-
-    def normal(a: Array, b: Array) -> Array:
-        c = np.cross(a, b)
-        return np.asarray(c / np.maximum(np.linalg.norm(c, axis=-1, keepdims=True), 1e-300))
-
-    def lean(a: Array, b: Array) -> Array:
-        return np.asarray(np.arcsin(np.clip((a * b).sum(axis=-1), -1.0, 1.0)))
-
-    total = 0.0
-    for i in range(2, len(places) - 1):
-        here, there = places[i : i + 2], np.stack([places[: i - 1], places[1:i]])
-        to_start, to_end = there[0] - here[0], there[1] - here[0]
-        from_start, from_end = there[0] - here[1], there[1] - here[1]
-        n = [
-            normal(to_start, to_end),
-            normal(to_end, from_end),
-            normal(from_end, from_start),
-            normal(from_start, to_start),
-        ]
-        angle = sum(lean(n[k], n[(k + 1) % 4]) for k in range(4))
-        sign = np.sign((np.cross(there[1] - there[0], here[1] - here[0]) * to_start).sum(axis=1))
-        total += float((angle * sign).sum())
-    return total / (2.0 * math.pi)
-
-
 def twist_rope(timestep: float, seconds: float) -> tuple[float, float, float, GedsHose]:
     """Turns a rope's end and brings it nearer, then lets it come to rest.
 
@@ -242,7 +213,7 @@ def twist_rope(timestep: float, seconds: float) -> tuple[float, float, float, Ge
     hose.step(round(1.0 / timestep))
     held = hose.reaction(end)
     twist = held.moment[0] / (2.0 * math.pi * spec.torsional_stiffness)
-    writhe = measure_writhe(hose.position(np.linspace(0.0, 1.0, 750)))
+    writhe = compute_writhe(hose.position(np.linspace(0.0, 1.0, 750)))
     return float(twist), writhe, float(held.force[0]) * RADIUS**2 / BENDING, hose
 
 

@@ -1,6 +1,7 @@
 """The dynamic cases, compared with their converged limit, and those with contact."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from weakref import WeakKeyDictionary
@@ -126,9 +127,30 @@ def make_suture_pull() -> Case:
     )
 
 
+_DRUM = 0.1  # radius (m)
+
+
+def _wind(angle: float, bend: float, leg: float) -> tuple[Callable[[Array], Array], Array, Array]:
+    """A line that is wound by an angle (rad) on a circle of radius `bend`, with straight legs (m).
+
+    Returns it as a function of arc length, and its unit tangents at its beginning and its end.
+    """
+    begin = 0.5 * (math.pi - angle)
+    first, last = (np.array([math.sin(a), 0.0, math.cos(a)]) for a in (begin, begin + angle))
+
+    def curve(s: Array) -> Array:
+        turn = np.clip((s - leg) / bend, 0.0, angle)
+        beyond = s - leg - angle * bend
+        legs = np.outer(np.minimum(s - leg, 0.0), first) + np.outer(np.maximum(beyond, 0.0), last)
+        arc = np.stack([-np.cos(begin + turn), 0.0 * s, np.sin(begin + turn)], axis=1)
+        return np.asarray(bend * arc + legs)
+
+    return curve, first, last
+
+
 def make_capstan() -> Case:
     """A hose drawn over half a drum."""
-    length, friction, drum, pull = 0.6, 0.3, 0.1, 1.0
+    length, friction, pull = 0.6, 0.3, 1.0
     speed, pause, n_steps = 0.05, 0.005, 300
     spec = HoseSpec(
         length=length,
@@ -139,13 +161,8 @@ def make_capstan() -> Case:
         outer_radius=0.005,
         damping_time=0.01,
     )
-    bend = drum + spec.outer_radius
-    leg = 0.5 * (length - math.pi * bend)
-
-    def curve(s: Array) -> Array:
-        angle = np.clip((s - leg) / bend, 0.0, math.pi)
-        down = np.maximum(leg - s, 0.0) + np.maximum(s - length + leg, 0.0)
-        return np.stack([-bend * np.cos(angle), 0.0 * s, bend * np.sin(angle) - down], axis=1)
+    bend = _DRUM + spec.outer_radius
+    curve, _, _ = _wind(math.pi, bend, 0.5 * (length - math.pi * bend))
 
     def lay(hose: HoseModel) -> list[Hold]:
         hose.reset(curve)
@@ -169,7 +186,56 @@ def make_capstan() -> Case:
         truth=lambda: np.array([reference.capstan(friction, math.pi)]),
         models=("geds",),
         obstacles=(
-            Obstacle(kind="cylinder", rotation=ACROSS, size=(drum, 0.2), friction=friction),
+            Obstacle(kind="cylinder", rotation=ACROSS, size=(_DRUM, 0.2), friction=friction),
+        ),
+        promised={20: 0.01},
+    )
+
+
+def make_held_capstan(turns: float = 0.5, friction: float = 0.3) -> Case:
+    """A hose drawn round a drum by a number of turns, then stopped and held for ten seconds."""
+    pull, speed, draw, brake, hold_time, leg = 1.0, 0.05, 1.5, 0.5, 10.0, 0.12
+    angle, bend = 2.0 * math.pi * turns, _DRUM + 0.005
+    curve, first, last = _wind(angle, bend, leg)
+    spec = HoseSpec(
+        length=angle * bend + 2.0 * leg,
+        axial_stiffness=2e4,
+        bending_stiffness=1e-5,
+        torsional_stiffness=0.0,
+        linear_density=0.1,
+        outer_radius=0.005,
+        damping_time=0.01,
+    )
+
+    def lay(hose: HoseModel) -> list[Hold]:
+        hose.reset(curve)
+        return []
+
+    def probe(hose: HoseModel) -> Array:
+        hose.apply_force(0.0, -pull * first)
+        hold, start = hose.attach(spec.length), hose.position(spec.length)[0]
+        n_steps, pulls = round(draw / hose.timestep), []
+        for k in range(n_steps):
+            hose.move(hold, start + speed * hose.timestep * (k + 1) * last)
+            hose.step()
+            pulls.append(hose.reaction(hold).force @ last)
+        left = np.linspace(1.0, 0.0, round(brake / hose.timestep) + 1)[1:]
+        way = speed * (draw + 0.5 * brake * (1.0 - left**2))
+        hose.follow({hold: start + np.outer(way, last)})
+        hose.step(round(hold_time / hose.timestep))
+        held = hose.reaction(hold).force @ last
+        return np.array([np.mean(pulls[n_steps // 2 :]), held]) / pull
+
+    bending = spec.bending_stiffness / (2.0 * pull * bend**2)
+    return make_case(
+        "held-capstan",
+        spec=spec,
+        lay=lay,
+        probe=probe,
+        truth=lambda: np.full(2, reference.capstan(friction, angle, bending)),
+        models=("geds",),
+        obstacles=(
+            Obstacle(kind="cylinder", rotation=ACROSS, size=(_DRUM, 0.2), friction=friction),
         ),
         promised={20: 0.01},
     )

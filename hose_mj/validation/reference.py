@@ -97,9 +97,15 @@ def euler_load(ends: str) -> float:
     return {"clamped-free": math.pi**2 / 4.0, "pinned": math.pi**2}[ends]
 
 
-def capstan(friction: float, angle: float) -> float:
-    """Ratio of the pulls on a rope that slides over a drum: exp(mu theta) (Euler, Eytelwein)."""
-    return math.exp(friction * angle)
+def capstan(friction: float, angle: float, bending: float = 0.0) -> float:
+    """Ratio of the pulls on a rope that slides over a drum: exp(mu theta) (Euler, Eytelwein).
+
+    To first order in its bending, b = EI / (2 T rho^2) with T the lesser pull and rho the radius of
+    its centre line: it leaves the drum where its moment is EI / rho, cos(alpha) = 1 - b before its
+    legs are straight, and the point forces T sin(alpha) there rub too.
+    """
+    ratio = math.exp(friction * angle)
+    return ratio * (1.0 - (1.0 + friction**2) * bending * (1.0 - 1.0 / ratio))
 
 
 BEND_45 = {300.0: (58.78, 22.25, 40.19), 600.0: (47.15, 15.68, 53.47)}

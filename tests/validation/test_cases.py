@@ -13,6 +13,7 @@ from hose_mj.validation import cases
 from hose_mj.validation.case import read_texts
 from hose_mj.validation.cases import CASES, TRIALS, find_cases
 from hose_mj.validation.compare import INEXTENSIBLE
+from hose_mj.validation.motions import make_held_capstan
 from hose_mj.validation.run import simulate
 from hose_mj.validation.settings import FULL, QUICK, Setting, list_ladders, list_static
 
@@ -67,7 +68,7 @@ def test_the_published_ids_are_there():
         *("heavy-cantilever", "tip-load", "end-moment", "frequencies", "hanging-chain"),
         *("catenary", "euler-buckling", "released-rod", "taut-pull", "free-flight"),
         *("bend-45", "ring-twist", "greenhill", "helix", "coil"),
-        *("mooring", "capstan", "floor-tow", "obstacle-drop"),
+        *("mooring", "capstan", "held-capstan", "floor-tow", "obstacle-drop"),
     }
     assert wanted <= {case.family for case in CASES}
     ids = {case.id for case in CASES}
@@ -162,6 +163,7 @@ def test_geds_keeps_its_promise(case):
 def test_promises_are_those_of_the_issue(case):
     promised = {
         "capstan": {20: 0.01},
+        "held-capstan": {20: 0.01},
         "bend-45": {12: 1e-3},
         "ring-twist": {16: 5e-3, 24: 5e-4},
         "greenhill": {16: 2e-3},
@@ -172,6 +174,16 @@ def test_promises_are_those_of_the_issue(case):
         assert case.promised == promised[case.family]
     if case.id == "floor-tow":
         assert case.promise == 0.005
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize(("turns", "limit"), [(0.25, 0.01), (0.5, 0.01), (1.0, 0.01), (1.5, 0.02)])
+def test_a_capstan_slides_and_holds_at_any_wrap(turns, friction, limit):
+    case = make_held_capstan(turns, friction)
+    slides, held = measure(case, "geds", 48)
+    assert abs(slides) < limit
+    assert abs(held) < limit + 0.002  # what it slips back by where it stops
 
 
 def test_a_slow_tow_stays_with_the_minimiser():

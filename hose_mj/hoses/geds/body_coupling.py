@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from hose_mj.errors import InputError
@@ -52,6 +53,7 @@ class BodyCoupling:
         """
         d = self._dynamics
         self._check_implicit()
+        d.first_energy = np.nan
         d.constraints.set_compliance(holds, positions, compliance)
         steps = int(d.counts[STEPS])
         verdict = d.run(stepping.TRY, 1)

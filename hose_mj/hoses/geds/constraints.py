@@ -65,6 +65,8 @@ class ConstraintSet:
         rows: what the kernels read and write; made anew by every change.
         is_closed: whether the hose is a closed loop.
         is_moved: whether a hold was made or moved since the last step.
+        is_linked: whether twist plus writhe is kept: a closed loop, or clamps at both ends.
+        spun: by how much the last clamp was spun more than the first (rad).
 
     The point moments on the hose are known here for their part along the tangent alone.
     """
@@ -72,6 +74,7 @@ class ConstraintSet:
     def __init__(self, spline: Spline, hose: records.Hose, x: Array) -> None:
         self._spline, self._hose = spline, hose
         self.is_closed = self.is_moved = False
+        self.spun = 0.0
         self._held: list[_Held] = []
         self._compliant: list[Hold] = []
         self._clamps: list[int] = []  # numbers of the holds, as in rows.twist
@@ -101,7 +104,7 @@ class ConstraintSet:
         Args:
             director: of the material where the hose begins, (3,); any by default.
         """
-        self._held, self._clamps, self.is_closed = [], [], False
+        self._held, self._clamps, self.is_closed, self.spun = [], [], False, 0.0
         self._moments, self._shares = [], []
         twist = twist_segments.make_twist(self._spline, self._hose, [], self._x)
         if self._spline.has_theta:
@@ -204,6 +207,12 @@ class ConstraintSet:
         self._aim(held, turns=tangent is not None)
         if spin != 0.0:
             self.rows.twist.spin[self._clamps.index(hold.number), 0] += spin
+            self._count_spin(hold, spin)
+
+    def _count_spin(self, hold: Hold, spin: float) -> None:
+        """Counts a spin (rad) of a clamp at either end."""
+        ends = hold.arc_length == self._spline.length, hold.arc_length == 0.0
+        self.spun += spin * (float(ends[0]) - float(ends[1]))
 
     def measure_jump(self) -> float:
         """The farthest that a hold goes within the next step (m)."""
@@ -286,6 +295,7 @@ class ConstraintSet:
         angle = float(np.arctan2(np.cross(now, director) @ held.tangent, now @ director))
         if self._spline.has_theta or len(self._clamps) > 1:
             twist.spin[clamp, 0] = angle
+            self._count_spin(hold, angle)
         else:
             # Nothing else knows the angle of a hose without theta.
             twist_segments.turn_director(twist, clamp, angle)
@@ -649,6 +659,8 @@ class ConstraintSet:
             before[first:] = coefficients[first:, :width] @ self._x[:width]
             before[first:] += coefficients[first:, width:] @ self._x[-width:]
         self._compliant = []
+        places = {one.hold.arc_length for one in self._held if one.tangent is not None}
+        self.is_linked = self.is_closed or {0.0, self._spline.length} <= places
         whole = (start, coefficients, before, after, multipliers, twist, records.make_response(0))
         return records.Constraints(*whole, self._make_springs(m))
 

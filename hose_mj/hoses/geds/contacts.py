@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,7 @@ class ContactSet:
         law: numbers of the contact law.
         arc_lengths: where along the hose contact is looked for, (Q,), m.
         order: the world axes in the order of the hose's coordinates.
+        works: whether what is touched has moved since the last reset.
     """
 
     contact: contact_law.Contact
@@ -82,7 +84,7 @@ class ContactSet:
     ) -> None:
         self._spline, self._spec, self._timestep = spline, spec, timestep
         self._state, self._scheme, self._tolerance = state, scheme, tolerance
-        self._is_closed = False
+        self._is_closed = self.works = False
         # The hose's coordinates first: a reflection where that is an odd permutation.
         rest = [c for c in range(3) if c not in spline.dims]
         self.order = [*spline.dims, *rest]
@@ -136,6 +138,7 @@ class ContactSet:
             InputError: a number that no obstacle has, a value outside its range.
         """
         check_count("obstacle", number, 0, len(self.obstacles) - 1)
+        self.works = True
         changes = {"position": position, "rotation": rotation}
         changes |= {"velocity": velocity, "angular_velocity": angular_velocity}
         wanted: dict[str, Any] = {name: v for name, v in changes.items() if v is not None}
@@ -154,6 +157,7 @@ class ContactSet:
             rotations: (k, 3, 3).
             twists: velocity and angular velocity, (k, 6), m/s, rad/s.
         """
+        self.works = True
         rows, order, k = self.contact.geoms, self.order, len(numbers)
         at = shapes.POSITION
         rows[numbers, at : at + 3] = (positions - self._spline.offset)[:, order]
@@ -186,6 +190,7 @@ class ContactSet:
             InputError: a wrong shape, a number that is not finite; the explicit scheme.
         """
         self._check_implicit()
+        self.works = True
         q = 0 if distances is None else len(self.arc_lengths)
         given = np.zeros((q, contact_law.GIVEN))
         if distances is not None:
@@ -229,6 +234,7 @@ class ContactSet:
             InputError: a wrong shape or a value outside its range; the explicit scheme.
         """
         self._check_implicit()
+        self.works = True
         places = read_numbers("neighbour", points, "finite places (m)")
         speeds = read_numbers("velocities of the neighbour", velocities, "finite numbers (m/s)")
         if places.ndim != 2 or places.shape[1:] != (3,) or len(places) < 2:
@@ -252,6 +258,7 @@ class ContactSet:
         self._strands[:] = 0.0
         self._strands[:, :, 0] = -1.0
         self._found[:] = 0.0
+        self.works = False
 
     @property
     def deepest(self) -> float:
@@ -267,6 +274,31 @@ class ContactSet:
     def crossings(self) -> int:
         """How often a contact point was beyond the middle of another part of the hose."""
         return int(self._found[contact_law.CROSSINGS])
+
+    def measure_turn(self) -> float:
+        """By how much the tangent turns within a span round what pushes at it, at most (rad).
+
+        For small turns: it is the change of the unit tangent against the span's contact force.
+        """
+        touching = self.contact.pairs[: int(self._found[contact_law.TOUCHED])]
+        if len(touching) == 0:
+            return 0.0
+        d, n_dof = self._spline.dimension, self._spline.n_dof
+        tangents = self._knot_slopes @ self._state.x.reshape(-1, n_dof)[:, :d]
+        tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
+        forces = np.zeros((len(tangents) - 1, d))
+        np.add.at(forces, touching[:, 14].astype(np.int64), touching[:, 2 : 2 + d])
+        sizes = np.maximum(np.linalg.norm(forces, axis=1), 1e-300)
+        turns = -np.sum(np.diff(tangents, axis=0) * forces, axis=1) / sizes
+        return float(max(turns.max(), 0.0))
+
+    @cached_property
+    def _knot_slopes(self) -> Array:
+        """What the control points count for in r' where spans meet, (S + 1, n), 1/m."""
+        n_spans = self._spline.n_control_points - basis.DEGREE
+        return self._spline.compute_jacobian(
+            np.linspace(0.0, self._spline.length, n_spans + 1), 1
+        ).T
 
     def set_closed(self, is_closed: bool) -> None:
         """Says whether the hose is a closed loop, whose ends do not touch each other."""

@@ -83,6 +83,8 @@ class Dynamics:
         counts: see `integrators.STEPS`; the steps are those since the last reset, (4,).
         watch: what says that a step leaves its healthy range.
         trial: the state after a step that was tried; see body_coupling.py.
+        first_energy: kinetic and elastic energy where the count of work begins (J); nan where that
+            is not known any more.
     """
 
     axes: tuple[float, ...]
@@ -95,6 +97,7 @@ class Dynamics:
     state: integrators.State
     counts: np.ndarray
     watch: HealthWatch
+    first_energy: float = np.nan
 
     def __post_init__(self) -> None:
         self.trial = integrators.make_state(len(self.state.x))
@@ -141,7 +144,8 @@ class Dynamics:
         # How deep a law of one's own is to sink is one's own affair.
         sunk = contacts.deepest if contacts.law.stiffness is None else 0.0
         steps, retries = int(self.counts[STEPS]), int(self.counts[RETRIES])
-        self.watch.check_steps(steps, retries, sunk, contacts.crossings)
+        crossings, measure_turn = contacts.crossings, contacts.measure_turn
+        self.watch.check_steps(steps, retries, sunk, crossings, measure_turn)
 
     def run(
         self,

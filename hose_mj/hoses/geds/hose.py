@@ -27,7 +27,7 @@ from hose_mj.hoses.geds.integrators import FALLBACKS, ITERATIONS, RETRIES, STEPS
 from hose_mj.hoses.geds.loads import LoadSet
 from hose_mj.hoses.geds.material_frames import check_rotation
 from hose_mj.hoses.geds.spline import Spline
-from hose_mj.hoses.health import Health, HealthWatch
+from hose_mj.hoses.health import Health, HealthWatch, Line
 from hose_mj.hoses.inputs import check_count, check_records, check_rows, check_vector
 from hose_mj.hoses.obstacles import ContactLaw, Obstacle
 from hose_mj.hoses.paths import Rows, check_paths
@@ -134,6 +134,8 @@ class GedsHose(SplineBody):
         self._weight += load.compute_buoyancy(self.gravity)
         self._loads = LoadSet(spline, self._weight, self.contacts, load)
         self._counts = np.zeros(4, dtype=np.int64)
+        self._links: Line | None = None
+        self._has_ends = False
         self._watch = HealthWatch(spec.length, strict)
         self._dynamics = Dynamics(
             *(self._axes, self._hose, self._constraints, self._loads, limits),
@@ -217,6 +219,7 @@ class GedsHose(SplineBody):
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
             "retries": int(self._counts[RETRIES]),
+            "first_energy": self._dynamics.first_energy,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -255,6 +258,8 @@ class GedsHose(SplineBody):
                 contacts = contacts | {name: rows}
         self.contacts.restore(contacts)
         self.contacts.set_closed(self.is_closed)
+        first_energy = take_array(state, "first_energy", (), is_finite=False)
+        self._dynamics.first_energy, self._links, self._has_ends = float(first_energy), None, False
 
     # -- holds and loads ---------------------------------------------------------------------------
 
@@ -307,6 +312,10 @@ class GedsHose(SplineBody):
         spin or a frame for an attachment, vectors out of a planar hose's plane, a frame that is no
         rotation or comes with a tangent or a spin.
         """
+        if tangent is not None or frame is not None:
+            self._links = None
+        if spin != 0.0 or frame is not None:
+            self._dynamics.first_energy = np.nan
         if frame is None:
             self._constraints.move(hold, position, tangent, spin)
             return
@@ -353,6 +362,8 @@ class GedsHose(SplineBody):
         if self._spline.has_theta:
             raise InputError("twist", "theta", "scalar for a hose that is to be closed")
         self._constraints.close(spin)
+        if spin != 0.0:
+            self._dynamics.first_energy = np.nan
         self.contacts.set_closed(True)
 
     def open(self) -> None:
@@ -375,6 +386,7 @@ class GedsHose(SplineBody):
         A hose without torsional stiffness carries no such part, and says so (`HoseWarning`).
         """
         self._loads.add_moment(arc_length, moment)
+        self._dynamics.first_energy = np.nan
         self._constraints.set_moments(self._loads.list_moments())
         if self.spec.torsional_stiffness == 0.0 and self._spline.dimension == 3:
             place, vector = self._loads.list_moments()[-1]
@@ -408,6 +420,7 @@ class GedsHose(SplineBody):
         if check_count("n_steps", n_steps, 0) == 0:
             return
         self._warn_of_spin()
+        self._begin_links()
         self._dynamics.advance(int(n_steps))
 
     def follow(self, positions: Rows, tangents: Rows | None = None) -> None:
@@ -419,14 +432,20 @@ class GedsHose(SplineBody):
         n_steps, paths = check_paths(positions, tangents)
         if n_steps > 0:
             self._warn_of_spin()
+            self._begin_links()
+            if tangents:
+                self._links = None
             self._dynamics.follow(paths, n_steps)
 
     @property
     def health(self) -> Health:
         """How well it went since the last reset."""
         steps, _, _, retries = self._counts.tolist()
-        found = self.contacts.deepest, self.contacts.crossings
-        return self._watch.report(steps, retries, *found, self.measure_least_stretch)
+        found = self.contacts.deepest, self.contacts.crossings, self.contacts.measure_turn()
+        is_known = not self.contacts.works and not self._loads.list_moments()
+        gained = self._measure_energy() - self._dynamics.first_energy - float(self._state.work[0])
+        rest = (gained if is_known else np.nan, self._draw_line(), self._links)
+        return self._watch.report(steps, retries, *found, self.measure_least_stretch, *rest)
 
     @contextmanager
     def unwatched(self) -> Iterator[None]:
@@ -460,6 +479,7 @@ class GedsHose(SplineBody):
         self._dynamics.solve_static(int(load_steps))
         self._constraints.is_moved = False
         self.contacts.forget()
+        self._forget_work()
         least = self.measure_least_stretch()
         found = Equilibrium(self._dynamics.check_stability(), least < FOLDED, least)
         turns = self._spline.dimension == 3 and bool(self._loads.list_moments())
@@ -531,3 +551,29 @@ class GedsHose(SplineBody):
         self.contacts.forget()
         self._loads.clear()
         self._constraints.clear(director)
+        self._forget_work()
+
+    def _forget_work(self) -> None:
+        """Begins to count work and links anew."""
+        self._state.work[0], self._links, self._has_ends = 0.0, None, False
+        self._dynamics.first_energy = self._measure_energy()
+
+    def _measure_energy(self) -> float:
+        """Kinetic and elastic energy (J): gravity counts as a load."""
+        found = self.energies()
+        return found.total - found.gravitational
+
+    def _draw_line(self) -> Line:
+        """The centre line of now."""
+        length, radius = self.spec.length, self.spec.outer_radius
+        pauses = round(min(max(length / (2.0 * radius), 4.0 * len(self._hose.tables.first)), 240.0))
+        twist = float(self.twist((np.arange(16) + 0.5) / 16.0 * length).mean()) * length
+        turns = (twist - self._constraints.spun) / (2.0 * np.pi)
+        points = self.position(np.linspace(0.0, length, pauses + 1))
+        return Line(points, length, radius, self.is_closed, turns)
+
+    def _begin_links(self) -> None:
+        """Remembers the centre line from which links are counted, once both ends are held."""
+        if self._has_ends != self._constraints.is_linked:
+            self._has_ends = not self._has_ends
+            self._links = self._draw_line() if self._has_ends else None

@@ -29,17 +29,6 @@ def test_a_knot_holds_by_itself_where_friction_is_enough():
     assert knots.measure_opening(0.05) > 3.0
 
 
-def test_writhe_of_curves_that_are_known():
-    t = np.linspace(0.0, 2.0 * np.pi, 401)
-    knot = np.stack(
-        [(2 + np.cos(3 * t)) * np.cos(2 * t), (2 + np.cos(3 * t)) * np.sin(2 * t), np.sin(3 * t)],
-        axis=1,
-    )
-    assert abs(knots.measure_writhe(knot)) == pytest.approx(3.5182, abs=2e-3)
-    flat = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
-    assert knots.measure_writhe(flat[:-5]) == pytest.approx(0.0, abs=1e-12)
-
-
 def test_a_plectoneme_loses_no_turn():
     twist, writhe, tension, hose = knots.twist_rope(0.002, 1.5)
     assert writhe > 3.0

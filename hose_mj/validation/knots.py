@@ -176,7 +176,9 @@ def measure_knot(is_quick: bool, rng: np.random.Generator) -> Findings:
         Check("opens with 1.6 of the friction that holds it (radii)", tight, 0.5),
         Check("opens with 0.6 of that (radii)", loose, 3.0, ">="),
     ]
-    lines = {"GEDS": (size, ratio), "Audoly, Clauvelin, Neukirch": (size, true)}
+    fine = np.linspace(size.min(), size.max(), 100)
+    published = [reference.find_knot_pull(e) for e in fine]
+    lines = {"GEDS": (size, ratio), "Audoly, Clauvelin, Neukirch": (fine, published)}
     title = "An overhand knot is drawn tight: pull, T e² / (2 π² EI)"
     plot = LinePlot(title, "pull", lines, {}, "end shortening e (radii of the rope)")
     return Findings(checks, {"knot": plot})

@@ -503,7 +503,8 @@ def _add_turn(axes, contact, row, share, work):
     _add_soft(axes, contact, row, b, share * row[_TURN], work)
     _add_soft(axes, contact, row, t, share * row[_TURN], work)
     part = row[_STRETCH] / distance
-    fall = max(row[_FALL], 0.1 * row[_STRETCH] ** 2)  # below, the strand bends round the point
+    # Below, the strand bends round the point, or is crushed to nothing.
+    fall = max(row[_FALL], 0.1 * max(row[_STRETCH], 0.1) ** 2)
     stiffness = share * row[_PRESSED] * distance / fall
     way = (part * t[0], part * t[1], part * t[2])
     soft, d = work.soft, len(axes)

@@ -210,7 +210,7 @@ class GedsHose(SplineBody):
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
             "retries": int(self._counts[RETRIES]),
-            "first_energy": self._dynamics.first_energy,
+            "first_energy": self._find_first(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -250,7 +250,10 @@ class GedsHose(SplineBody):
         self.contacts.restore(contacts)
         self.contacts.set_closed(self.is_closed)
         first_energy = take_array(state, "first_energy", (), is_finite=False)
+        if np.isnan(first_energy):
+            raise InputError("first_energy of a snapshot", first_energy, "a number (J)")
         self._dynamics.first_energy, self._links, self._has_ends = float(first_energy), None, False
+        self.contacts.works = False
 
     # -- holds and loads ---------------------------------------------------------------------------
 
@@ -306,7 +309,7 @@ class GedsHose(SplineBody):
         if tangent is not None or frame is not None:
             self._links = None
         if spin != 0.0 or frame is not None:
-            self._dynamics.first_energy = np.nan
+            self._dynamics.first_energy = np.inf
         if frame is None:
             self._constraints.move(hold, position, tangent, spin)
             return
@@ -354,7 +357,7 @@ class GedsHose(SplineBody):
             raise InputError("twist", "theta", "scalar for a hose that is to be closed")
         self._constraints.close(spin)
         if spin != 0.0:
-            self._dynamics.first_energy = np.nan
+            self._dynamics.first_energy = np.inf
         self.contacts.set_closed(True)
 
     def open(self) -> None:
@@ -377,7 +380,7 @@ class GedsHose(SplineBody):
         A hose without torsional stiffness carries no such part, and says so (`HoseWarning`).
         """
         self._loads.add_moment(arc_length, moment)
-        self._dynamics.first_energy = np.nan
+        self._dynamics.first_energy = np.inf
         self._constraints.set_moments(self._loads.list_moments())
         if self.spec.torsional_stiffness == 0.0 and self._spline.dimension == 3:
             place, vector = self._loads.list_moments()[-1]
@@ -433,9 +436,8 @@ class GedsHose(SplineBody):
         """How well it went since the last reset."""
         steps, _, _, retries = self._counts.tolist()
         found = self.contacts.deepest, self.contacts.crossings, self.contacts.measure_turn()
-        is_known = not self.contacts.works and not self._loads.list_moments()
-        gained = self._measure_energy() - self._dynamics.first_energy - float(self._state.work[0])
-        rest = (gained if is_known else np.nan, self._draw_line(), self._links)
+        gained = self._measure_energy() - self._find_first() - float(self._state.work[0])
+        rest = (gained if np.isfinite(gained) else np.nan, self._draw_line(), self._links)
         return self._watch.report(steps, retries, *found, self.measure_least_stretch, *rest)
 
     def solve_static(self, load_steps: int = 1) -> Equilibrium:
@@ -535,6 +537,10 @@ class GedsHose(SplineBody):
         """Begins to count work and links anew."""
         self._state.work[0], self._links, self._has_ends = 0.0, None, False
         self._dynamics.first_energy = self._measure_energy()
+
+    def _find_first(self) -> float:
+        """Energy where the count of work begins (J); infinite where work is not known any more."""
+        return np.inf if self.contacts.works else self._dynamics.first_energy
 
     def _measure_energy(self) -> float:
         """Kinetic and elastic energy (J): gravity counts as a load."""

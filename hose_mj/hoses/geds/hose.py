@@ -306,14 +306,12 @@ class GedsHose(SplineBody):
         spin or a frame for an attachment, vectors out of a planar hose's plane, a frame that is no
         rotation or comes with a tangent or a spin.
         """
-        if tangent is not None or frame is not None:
-            self._links = None
-        if spin != 0.0 or frame is not None:
-            self._dynamics.first_energy = np.inf
         if frame is None:
             self._constraints.move(hold, position, tangent, spin)
+            self._turn_hold(tangent is not None, spin != 0.0)
             return
         axes = check_rotation("frame", frame)
+        self._turn_hold(True, True)
         if tangent is not None or spin != 0.0:
             raise InputError.about(
                 "a clamp moved by a frame takes no tangent and no spin beside it"
@@ -356,8 +354,7 @@ class GedsHose(SplineBody):
         if self._spline.has_theta:
             raise InputError("twist", "theta", "scalar for a hose that is to be closed")
         self._constraints.close(spin)
-        if spin != 0.0:
-            self._dynamics.first_energy = np.inf
+        self._turn_hold(False, spin != 0.0)
         self.contacts.set_closed(True)
 
     def open(self) -> None:
@@ -537,6 +534,13 @@ class GedsHose(SplineBody):
         """Begins to count work and links anew."""
         self._state.work[0], self._links, self._has_ends = 0.0, None, False
         self._dynamics.first_energy = self._measure_energy()
+
+    def _turn_hold(self, is_turned: bool, is_spun: bool) -> None:
+        """Counts no links from where a hold was turned, and no work where it was spun."""
+        if is_turned:
+            self._links = None
+        if is_spun:
+            self._dynamics.first_energy = np.inf
 
     def _find_first(self) -> float:
         """Energy where the count of work begins (J); infinite where work is not known any more."""

@@ -21,6 +21,7 @@ def make(length=1.0, drag=0.1, **options):
     return make_hose("geds", spec, **options)
 
 
+@pytest.mark.filterwarnings("ignore:a surface bends the hose:hose_mj.HoseWarning")
 @pytest.mark.parametrize("dt", [0.001, 0.005])
 @pytest.mark.parametrize("force", [20.0, 200.0])
 @pytest.mark.parametrize("post", [0.005, 0.03, 0.1])

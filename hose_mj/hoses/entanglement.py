@@ -41,16 +41,17 @@ def compute_least_distance(points: Array, length: float, apart: float, is_closed
     Returns:
         infinity for a line that is shorter than that.
     """
-    pause = length / (len(points) - 1)
-    between = np.abs(np.subtract.outer(np.arange(len(points)), np.arange(len(points)))) * pause
-    if is_closed:
-        between = np.minimum(between, length - between)
-    squares = np.sum((points[:, None] - points[None]) ** 2, axis=2)
-    squares[between <= apart] = np.inf
-    one, other = np.unravel_index(np.argmin(squares), squares.shape)
-    if not np.isfinite(squares[one, other]):
-        return float("inf")
-    near = [np.clip(k + _FINE, 0.0, len(points) - 1.0) for k in (one, other)]
-    along = np.arange(len(points))
-    parts = [np.stack([np.interp(k, along, row) for row in points.T], axis=1) for k in near]
-    return float(np.linalg.norm(parts[0][:, None] - parts[1][None], axis=2).min())
+    pause, along = length / (len(points) - 1), np.arange(1.0 * len(points))
+
+    def measure(one: Array, other: Array) -> Array:
+        """Distances between places, in pauses from the start, infinite where arc is short."""
+        parts = [np.stack([np.interp(k, along, c) for c in points.T], axis=1) for k in (one, other)]
+        between = np.abs(np.subtract.outer(one, other)) * pause
+        if is_closed:
+            between = np.minimum(between, length - between)
+        found = np.linalg.norm(parts[0][:, None] - parts[1][None], axis=2)
+        return np.where(between > apart, found, np.inf)
+
+    coarse = measure(along, along)
+    nearest = np.unravel_index(np.argmin(coarse), coarse.shape)
+    return float(measure(*(np.clip(k + _FINE, 0.0, along[-1]) for k in nearest)).min())

@@ -15,7 +15,7 @@ from hose_mj.hoses.protocol import Array
 
 MOST_RETRIES = 0.5  # a step; impacts on thin walls take 0.3, free motions none
 DEEPEST = 0.3  # radii; the default law sinks 0.2 at the tension that breaks a hose
-SHARPEST = 0.7  # rad a span: the ratio of the pulls round a post is then off by 2 % (physics.md)
+SHARPEST = 0.75  # rad a span: the ratio of the pulls round a post is then off by 2 % (physics.md)
 LARGEST_STRAIN = 0.01  # as laid
 LARGEST_JUMP = 0.1  # of the length; what moves farther in a step throws the hose
 EVERY = 64  # steps between two looks at retries and mesh
@@ -158,7 +158,7 @@ class HealthWatch:
                     "mesh",
                     f"a surface bends the hose by {self.sharpest:.2g} rad within one span, which a "
                     "span cannot follow: take more control points, so that it is "
-                    f"{0.7 * SHARPEST:.1g} at most",
+                    f"{0.67 * SHARPEST:.1g} at most",
                 )
             share = (retries - known) / (steps - before)
             if share > MOST_RETRIES:

@@ -220,7 +220,7 @@ def make_held_capstan(turns: float = 0.5, friction: float = 0.3) -> Case:
             hose.step()
             pulls.append(hose.reaction(hold).force @ last)
         left = np.linspace(1.0, 0.0, round(brake / hose.timestep) + 1)[1:]
-        way = speed * (draw + 0.5 * brake * (1.0 - left**2))
+        way = speed * (draw + brake / 3.0 * (1.0 - left**3))
         hose.follow({hold: start + np.outer(way, last)})
         hose.step(round(hold_time / hose.timestep))
         held = hose.reaction(hold).force @ last

@@ -118,6 +118,29 @@ def test_reset_lays_the_hose_along_a_curve(hose):
         assert hose.energies().gravitational == pytest.approx(-WEIGHT * below, rel=0.02)
 
 
+def test_a_path_is_move_and_step_in_turn(hose):
+    hose.reset(arch)
+    start, tip = hose.position(0.0)[0], hose.attach(1.0)
+    first = hose.clamp(0.0)
+    ends = hose.position(1.0)[0] + 1e-3 * np.arange(1, 7)[:, None] * [-1.0, 0.0, 0.5]
+    starts = start + 1e-3 * np.arange(1, 7)[:, None] * [0.0, 0.0, 1.0]
+    saved = hose.snapshot()
+    hose.follow({tip: ends, first: starts})
+    found = observe(hose)
+    assert hose.time == pytest.approx(6 * hose.timestep)
+    np.testing.assert_allclose(hose.position(1.0)[0], ends[-1], atol=2e-3)
+    hose.restore(saved)
+    for end, begin in zip(ends, starts, strict=True):
+        hose.move(tip, end)
+        hose.move(first, begin)
+        hose.step()
+    np.testing.assert_array_equal(observe(hose), found)
+    with pytest.raises(InputError, match="shape of a path"):
+        hose.follow({tip: ends, first: starts[:3]})
+    with pytest.raises(InputError, match="tangents"):
+        hose.follow({tip: ends}, {tip: ends})
+
+
 def test_reset_takes_a_velocity_and_starts_the_clock_again(hose):
     hold = hose.attach(0.0)
     hose.step(2)

@@ -183,7 +183,7 @@ def test_a_capstan_slides_and_holds_at_any_wrap(turns, friction, limit):
     case = make_held_capstan(turns, friction)
     slides, held = measure(case, "geds", 48)
     assert abs(slides) < limit
-    assert abs(held) < limit + 0.002  # what it slips back by where it stops
+    assert abs(held) < 0.02  # the elastic hose slips back by as much where it stops
 
 
 def test_a_slow_tow_stays_with_the_minimiser():

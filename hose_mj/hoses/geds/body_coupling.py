@@ -53,7 +53,7 @@ class BodyCoupling:
         """
         d = self._dynamics
         self._check_implicit()
-        d.first_energy = np.nan
+        d.first_energy = np.inf
         d.constraints.set_compliance(holds, positions, compliance)
         steps = int(d.counts[STEPS])
         verdict = d.run(stepping.TRY, 1)

@@ -83,8 +83,8 @@ class Dynamics:
         counts: see `integrators.STEPS`; the steps are those since the last reset, (4,).
         watch: what says that a step leaves its healthy range.
         trial: the state after a step that was tried; see body_coupling.py.
-        first_energy: kinetic and elastic energy where the count of work begins (J); nan where that
-            is not known any more.
+        first_energy: kinetic and elastic energy where the count of work begins (J); infinite
+            where work is not known any more.
     """
 
     axes: tuple[float, ...]
@@ -97,7 +97,7 @@ class Dynamics:
     state: integrators.State
     counts: np.ndarray
     watch: HealthWatch
-    first_energy: float = np.nan
+    first_energy: float = np.inf
 
     def __post_init__(self) -> None:
         self.trial = integrators.make_state(len(self.state.x))

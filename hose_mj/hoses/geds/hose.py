@@ -219,7 +219,7 @@ class GedsHose(SplineBody):
             "iterations": self.iterations,
             "fallbacks": self.fallbacks,
             "retries": int(self._counts[RETRIES]),
-            "first_energy": self._dynamics.first_energy,
+            "first_energy": self._find_first(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -259,7 +259,10 @@ class GedsHose(SplineBody):
         self.contacts.restore(contacts)
         self.contacts.set_closed(self.is_closed)
         first_energy = take_array(state, "first_energy", (), is_finite=False)
+        if np.isnan(first_energy):
+            raise InputError("first_energy of a snapshot", first_energy, "a number (J)")
         self._dynamics.first_energy, self._links, self._has_ends = float(first_energy), None, False
+        self.contacts.works = False
 
     # -- holds and loads ---------------------------------------------------------------------------
 
@@ -312,14 +315,12 @@ class GedsHose(SplineBody):
         spin or a frame for an attachment, vectors out of a planar hose's plane, a frame that is no
         rotation or comes with a tangent or a spin.
         """
-        if tangent is not None or frame is not None:
-            self._links = None
-        if spin != 0.0 or frame is not None:
-            self._dynamics.first_energy = np.nan
         if frame is None:
             self._constraints.move(hold, position, tangent, spin)
+            self._turn_hold(tangent is not None, spin != 0.0)
             return
         axes = check_rotation("frame", frame)
+        self._turn_hold(True, True)
         if tangent is not None or spin != 0.0:
             raise InputError.about(
                 "a clamp moved by a frame takes no tangent and no spin beside it"
@@ -362,8 +363,7 @@ class GedsHose(SplineBody):
         if self._spline.has_theta:
             raise InputError("twist", "theta", "scalar for a hose that is to be closed")
         self._constraints.close(spin)
-        if spin != 0.0:
-            self._dynamics.first_energy = np.nan
+        self._turn_hold(False, spin != 0.0)
         self.contacts.set_closed(True)
 
     def open(self) -> None:
@@ -386,7 +386,7 @@ class GedsHose(SplineBody):
         A hose without torsional stiffness carries no such part, and says so (`HoseWarning`).
         """
         self._loads.add_moment(arc_length, moment)
-        self._dynamics.first_energy = np.nan
+        self._dynamics.first_energy = np.inf
         self._constraints.set_moments(self._loads.list_moments())
         if self.spec.torsional_stiffness == 0.0 and self._spline.dimension == 3:
             place, vector = self._loads.list_moments()[-1]
@@ -442,9 +442,8 @@ class GedsHose(SplineBody):
         """How well it went since the last reset."""
         steps, _, _, retries = self._counts.tolist()
         found = self.contacts.deepest, self.contacts.crossings, self.contacts.measure_turn()
-        is_known = not self.contacts.works and not self._loads.list_moments()
-        gained = self._measure_energy() - self._dynamics.first_energy - float(self._state.work[0])
-        rest = (gained if is_known else np.nan, self._draw_line(), self._links)
+        gained = self._measure_energy() - self._find_first() - float(self._state.work[0])
+        rest = (gained if np.isfinite(gained) else np.nan, self._draw_line(), self._links)
         return self._watch.report(steps, retries, *found, self.measure_least_stretch, *rest)
 
     @contextmanager
@@ -557,6 +556,17 @@ class GedsHose(SplineBody):
         """Begins to count work and links anew."""
         self._state.work[0], self._links, self._has_ends = 0.0, None, False
         self._dynamics.first_energy = self._measure_energy()
+
+    def _turn_hold(self, is_turned: bool, is_spun: bool) -> None:
+        """Counts no links from where a hold was turned, and no work where it was spun."""
+        if is_turned:
+            self._links = None
+        if is_spun:
+            self._dynamics.first_energy = np.inf
+
+    def _find_first(self) -> float:
+        """Energy where the count of work begins (J); infinite where work is not known any more."""
+        return np.inf if self.contacts.works else self._dynamics.first_energy
 
     def _measure_energy(self) -> float:
         """Kinetic and elastic energy (J): gravity counts as a load."""

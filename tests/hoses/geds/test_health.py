@@ -148,41 +148,15 @@ def test_a_mesh_too_coarse_for_a_post_is_said(radius, n, sees):
     assert hose.health.sharpest_contact == 0.0
 
 
-def drive(dt, scheme="bdf2", spring=None, **options):
-    """A hose that one hold shakes for half a second, and the work that this takes."""
+def shake(dt, spring=None, **options):
+    """A hose that one clamp shakes and turns for half a second, and the work that is done."""
     spec = HoseSpec(length=1.0, axial_stiffness=2e3, bending_stiffness=0.05, linear_density=0.1)
-    hose = make_hose("geds", spec, timestep=dt, scheme=scheme, control_points=10, **options)
+    hose = make_hose("geds", spec, timestep=dt, control_points=10, **options)
     hose.reset([[0, 0, 0], [1, 0, 0]])
-    hose.apply_force(0.5, (0.0, 0.1, 0.2))
+    hose.apply_force(0.5, (0.1, 0.0, 0.2))
     hold = hose.clamp(0.0, spring=spring)
     t = dt * np.arange(1, round(0.5 / dt) + 1)
-    hose.follow({hold: np.stack([0 * t, 0 * t, 0.05 * np.sin(12.0 * t) ** 2], axis=1)})
-    return hose, abs(float(hose.snapshot()["state"]["work"][0]))
-
-
-@pytest.mark.parametrize("spring", [None, Spring(200.0, 0.5)])
-@pytest.mark.parametrize("options", [{}, {"plane": "xz"}, {"twist": "theta"}])
-def test_no_energy_beyond_the_work_that_is_done(options, spring):
-    if "plane" in options and spring is None:
-        options = options | {"gravity": (0.0, 0.0, 0.0)}
-    left = []
-    for dt in (0.002, 0.001):
-        if options.get("plane"):
-            hose, work = drive_in_a_plane(dt, spring, **options)
-        else:
-            hose, work = drive(dt, "midpoint", spring, **options)
-        left.append(abs(hose.health.energy_gained))
-        assert left[-1] < 5e-3 * work
-    assert left[1] < 0.6 * left[0]
-
-
-def drive_in_a_plane(dt, spring, **options):
-    spec = HoseSpec(length=1.0, axial_stiffness=2e3, bending_stiffness=0.05, linear_density=0.1)
-    hose = make_hose("geds", spec, timestep=dt, scheme="midpoint", control_points=10, **options)
-    hose.reset([[0, 0, 0], [1, 0, 0]])
-    hold = hose.clamp(0.0, spring=spring)
-    t = dt * np.arange(1, round(0.5 / dt) + 1)
-    turn = 0.3 * np.sin(8.0 * t)
+    turn = 0.3 * np.sin(8.0 * t) ** 2
     hose.follow(
         {hold: np.stack([0 * t, 0 * t, 0.05 * np.sin(12.0 * t) ** 2], axis=1)},
         {hold: np.stack([np.cos(turn), 0 * t, np.sin(turn)], axis=1)},
@@ -190,8 +164,19 @@ def drive_in_a_plane(dt, spring, **options):
     return hose, abs(float(hose.snapshot()["state"]["work"][0]))
 
 
+@pytest.mark.parametrize("spring", [None, Spring(200.0, 0.5)])
+@pytest.mark.parametrize("options", [{}, {"plane": "xz"}, {"twist": "theta"}])
+def test_no_energy_beyond_the_work_that_is_done(options, spring):
+    left = []
+    for dt in (0.002, 0.001):
+        hose, work = shake(dt, spring, **options)
+        left.append(abs(hose.health.energy_gained))
+        assert left[-1] < 0.01 * work
+    assert left[1] < 0.35 * left[0]  # second order
+
+
 def test_what_the_step_damps_is_lost_and_what_is_unknown_is_not_given():
-    hose, work = drive(0.005)
+    hose, work = shake(0.005)
     assert -0.5 * work < hose.health.energy_gained < 1e-3 * work
     saved, gained = hose.snapshot(), hose.health.energy_gained
     hose.apply_moment(0.5, (0.0, 0.01, 0.0))
@@ -225,14 +210,18 @@ def test_a_strand_drawn_through_another_loses_two_links():
     hose.clamp(1.0)
     strand = hose.attach(float(np.interp(1.7, u, along) / along[-1]))
     start = hose.position(strand.arc_length)[0]
-    apart = hose.health.least_distance
-    assert apart == pytest.approx(0.6 * np.sin(1.7) / along[-1] / spec.outer_radius, rel=0.05)
     found = []
-    for share in (0.3, 2.0):
+    for share in (0.8, 1.2):
         way = np.linspace(0.0, 1.0, 101)[1:, None] * (0.0, -share * 0.6 / along[-1], 0.0)
         hose.follow({strand: start + way})
         start = start + way[-1]
         found.append(abs(hose.health.lost_links))
+        if share < 1.0:
+            s = np.linspace(0.0, 1.0, 1001)
+            places = hose.position(s)
+            near = np.linalg.norm(places[:, None] - places[None], axis=2)
+            near = near[np.abs(s[:, None] - s) > 6.0 * spec.outer_radius].min()
+            assert hose.health.least_distance * spec.outer_radius == pytest.approx(near, rel=0.02)
     assert found == [0, 2]
     hose.move(hose.holds[0], spin=2.0 * np.pi)
     hose.step(20)

@@ -8,6 +8,7 @@ from hose_mj.validation.leaks import RADIUS, drop_on_bar, pull_round, throw_at_w
 from hose_mj.validation.leaks import make_light_hose as make
 
 
+@pytest.mark.filterwarnings("ignore:a surface bends the hose:hose_mj.HoseWarning")
 @pytest.mark.parametrize("dt", [0.001, 0.005])
 @pytest.mark.parametrize("force", [20.0, 200.0])
 @pytest.mark.parametrize("post", [0.005, 0.03, 0.1])

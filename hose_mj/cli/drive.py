@@ -120,7 +120,8 @@ def run(args: Args) -> int:
     _show(desk)
     if args.json:
         world = desk.world
-        results = {"sim_time": world.time, "breaks": desk.breaks, "health": world.health}
+        health = world.health and world.health.summarize()
+        results = {"sim_time": world.time, "breaks": desk.breaks, "health": health}
         print_document(make_document("drive", args, results=results))
     return 0
 

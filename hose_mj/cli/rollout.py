@@ -78,7 +78,7 @@ class Rollout:
             "break": outcome.broken.to_record() if outcome.broken else None,
             "stalled": outcome.stalled,
             "recording": str(args.save) if args.save else None,
-            "health": self.world.health,
+            "health": self.world.health and self.world.health.summarize(),
             "wall_s": self.wall_s,
             "recording_overhead": self.overhead,
         }

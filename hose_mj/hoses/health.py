@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -49,6 +50,13 @@ class Health:
     energy_gained: float
     line: Line = field(repr=False, compare=False)  # the centre line now
     begun: Line | None = field(repr=False, compare=False)  # when its ends were last taken hold of
+
+    def summarize(self) -> dict[str, Any]:
+        """Its numbers and warnings, for documents; None for what is not known."""
+        shown = {part.name: getattr(self, part.name) for part in fields(self) if part.repr}
+        if math.isnan(self.energy_gained):
+            shown["energy_gained"] = None
+        return shown
 
     @cached_property
     def least_distance(self) -> float:

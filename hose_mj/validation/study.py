@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -97,7 +97,7 @@ class Study:
             if outcome.health is not None:
                 closest.setdefault(outcome.case, outcome)
         return [
-            {"case": case, "setting": one.setting.label, **asdict(one.health)}
+            {"case": case, "setting": one.setting.label, **one.health.summarize()}
             for case, one in closest.items()
             if one.health is not None
         ]
